@@ -1,0 +1,13 @@
+//! What a scene is made of and what is asked of it: boxes, rays, hits, triangle meshes.
+
+mod aabb;
+mod hit;
+mod mesh;
+mod prepared;
+mod ray;
+
+pub use aabb::Aabb;
+pub use hit::Hit;
+pub use mesh::{MeshError, Position, TriangleIndices, TriangleMesh};
+pub(crate) use prepared::{PreparedRay, pow2};
+pub use ray::Ray;

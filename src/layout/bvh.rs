@@ -1,0 +1,163 @@
+//! The hierarchy: its parts, checked once when they are put together.
+
+use super::{
+    Borrowed, Child, LayoutError, Leaf, Node4, Node8, PrimitiveLeaf, Storage, TriangleLeaf,
+    WideNode, check,
+};
+use crate::{geometry::Aabb, simd::Backend};
+use core::fmt;
+
+/// A wide bounding volume hierarchy: nodes `N`, leaves `L`, memory of `S`.
+///
+/// Built by [`Builder`](crate::build::Builder), or put together from parts by [`from_parts`](Self::from_parts).
+#[derive(Clone)]
+pub struct Bvh<N: WideNode, L: Leaf, S: Storage> {
+    nodes: S::Slice<N>,
+    leaves: S::Slice<L>,
+    primitives: S::Slice<u32>,
+    root: Child,
+    bounds: Aabb,
+    backend: Backend,
+    dropped: u32,
+}
+
+/// Triangles under 8-wide nodes, borrowed.
+pub type Bvh8Ref<'a> = Bvh<Node8, TriangleLeaf, Borrowed<'a>>;
+/// Triangles under 4-wide nodes, borrowed.
+pub type Bvh4Ref<'a> = Bvh<Node4, TriangleLeaf, Borrowed<'a>>;
+/// A caller's primitives under 8-wide nodes, borrowed.
+pub type PrimitiveBvh8Ref<'a> = Bvh<Node8, PrimitiveLeaf, Borrowed<'a>>;
+/// A caller's primitives under 4-wide nodes, borrowed.
+pub type PrimitiveBvh4Ref<'a> = Bvh<Node4, PrimitiveLeaf, Borrowed<'a>>;
+
+#[cfg(feature = "alloc")]
+mod owned {
+    use super::*;
+    use crate::layout::Owned;
+
+    /// Triangles under 8-wide nodes.
+    pub type Bvh8 = Bvh<Node8, TriangleLeaf, Owned>;
+    /// Triangles under 4-wide nodes.
+    pub type Bvh4 = Bvh<Node4, TriangleLeaf, Owned>;
+    /// A caller's primitives under 8-wide nodes.
+    pub type PrimitiveBvh8 = Bvh<Node8, PrimitiveLeaf, Owned>;
+    /// A caller's primitives under 4-wide nodes.
+    pub type PrimitiveBvh4 = Bvh<Node4, PrimitiveLeaf, Owned>;
+}
+#[cfg(feature = "alloc")]
+pub use owned::*;
+
+impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
+    /// Puts a hierarchy together.
+    ///
+    /// The parts are in one canonical order, which makes the check linear and needs no memory: `root` is
+    /// node 0, or leaf 0 where there is no node, or empty. Seen from the root in depth-first order,
+    /// lane by lane, each node's children that are nodes follow, side by side, the last node met so far,
+    /// and those that are leaves the last leaf. `primitives` is what leaves count in: the numbers that
+    /// hits are reported with. `bounds` are the bounds of all primitives.
+    ///
+    /// # Errors
+    /// Anything that would make a query read out of bounds, loop or need more than its stack; or a box that
+    /// is no box, or is not within `bounds`.
+    pub fn from_parts(
+        nodes: S::Slice<N>,
+        leaves: S::Slice<L>,
+        primitives: S::Slice<u32>,
+        bounds: Aabb,
+    ) -> Result<Self, LayoutError> {
+        let root = check::check(&nodes, &leaves, &primitives, &bounds)?;
+        Ok(Self {
+            nodes,
+            leaves,
+            primitives,
+            root,
+            bounds,
+            backend: Backend::detect(),
+            dropped: 0,
+        })
+    }
+
+    /// The nodes, the root first.
+    #[inline(always)]
+    pub fn nodes(&self) -> &[N] {
+        &self.nodes
+    }
+
+    /// The leaves.
+    #[inline(always)]
+    pub fn leaves(&self) -> &[L] {
+        &self.leaves
+    }
+
+    /// The number of each primitive in the leaves.
+    #[inline(always)]
+    pub fn primitives(&self) -> &[u32] {
+        &self.primitives
+    }
+
+    /// Where a walk begins.
+    #[inline(always)]
+    pub fn root(&self) -> Child {
+        self.root
+    }
+
+    /// The bounds of all primitives; [`Aabb::EMPTY`] if there are none.
+    #[inline(always)]
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// The instructions that queries use.
+    #[inline(always)]
+    pub fn backend(&self) -> Backend {
+        self.backend
+    }
+
+    /// Has queries use other instructions than the best. The answers are the same.
+    pub fn set_backend(&mut self, backend: Backend) {
+        self.backend = backend;
+    }
+
+    /// The same hierarchy, borrowed.
+    pub fn as_borrowed(&self) -> Bvh<N, L, Borrowed<'_>> {
+        Bvh {
+            nodes: &self.nodes,
+            leaves: &self.leaves,
+            primitives: &self.primitives,
+            root: self.root,
+            bounds: self.bounds,
+            backend: self.backend,
+            dropped: self.dropped,
+        }
+    }
+
+    /// Notes that the builder left out this many primitives.
+    #[cfg(feature = "std")]
+    pub(crate) fn with_dropped(self, dropped: u32) -> Self {
+        Self { dropped, ..self }
+    }
+
+    /// How many primitives the builder left out because they were not finite.
+    pub fn dropped(&self) -> usize {
+        self.dropped as usize
+    }
+
+    /// How many bytes nodes, leaves and primitive numbers take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes()) + size_of_val(self.leaves()) + size_of_val(self.primitives())
+    }
+}
+
+impl<N: WideNode, L: Leaf, S: Storage> fmt::Debug for Bvh<N, L, S> {
+    /// How much there is of each part, not the parts.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bvh")
+            .field("width", &N::WIDTH)
+            .field("nodes", &self.nodes.len())
+            .field("leaves", &self.leaves.len())
+            .field("primitives", &self.primitives.len())
+            .field("bounds", &self.bounds)
+            .field("backend", &self.backend)
+            .finish()
+    }
+}

@@ -1,0 +1,174 @@
+//! Full-precision nodes, 4 and 8 wide.
+
+use super::Child;
+use crate::{
+    geometry::Aabb,
+    simd::{Simd, Vector},
+    slab::{Planes, RaySlabs},
+};
+use bytemuck::{Pod, Zeroable};
+use sealed::Sealed;
+
+/// A node of some width and precision: what the one traversal needs of it.
+pub trait WideNode: Pod + Sealed {
+    /// How many children it has at most.
+    const WIDTH: usize;
+    /// The ray in this node's terms, in a backend's vectors.
+    #[doc(hidden)]
+    type Slabs<S: Simd>: Copy;
+    /// A float a child, in a backend's vector.
+    #[doc(hidden)]
+    type Lanes<S: Simd>: Copy;
+
+    /// A node of up to [`WIDTH`](Self::WIDTH) children with their bounds, in the lanes' order; more are
+    /// left out.
+    fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self;
+
+    /// What each lane leads to.
+    fn children(&self) -> &[Child];
+
+    /// The bounds of the child in a lane, as they are tested. Empty past the last.
+    fn child_aabb(&self, lane: usize) -> Aabb;
+
+    #[doc(hidden)]
+    fn slabs<S: Simd>(
+        token: S,
+        ray: &crate::geometry::PreparedRay,
+        bounds: &Aabb,
+    ) -> Self::Slabs<S>;
+    #[doc(hidden)]
+    fn splat<S: Simd>(token: S, x: f32) -> Self::Lanes<S>;
+    /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
+    #[doc(hidden)]
+    fn test<S: Simd>(
+        &self,
+        token: S,
+        slabs: &Self::Slabs<S>,
+        t_max: Self::Lanes<S>,
+    ) -> (u32, Self::Lanes<S>);
+    /// One lane of many.
+    #[doc(hidden)]
+    fn lane<S: Simd>(lanes: &Self::Lanes<S>, lane: usize) -> f32;
+}
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// `W` children: the planes of their boxes by axis, side and child, then where they lie. Empty lanes come
+/// last, with a box that no ray passes.
+///
+/// `A` is a type of the alignment that a load of `W` floats wants.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Node<const W: usize, A> {
+    align: [A; 0],
+    planes: Planes<W>,
+    children: [Child; W],
+}
+
+/// 16 bytes of alignment.
+#[derive(Clone, Copy, Debug, Zeroable, Pod)]
+#[repr(C, align(16))]
+pub struct Align16([u8; 16]);
+
+/// 32 bytes of alignment.
+#[derive(Clone, Copy, Debug, Zeroable, Pod)]
+#[repr(C, align(32))]
+pub struct Align32([u8; 32]);
+
+/// 4 children in 112 bytes.
+pub type Node4 = Node<4, Align16>;
+/// 8 children in 224 bytes.
+pub type Node8 = Node<8, Align32>;
+
+macro_rules! impl_wide_node {
+    ($node:ty, $width:literal, $vector:ident, $bytes:literal) => {
+        const _: () = assert!(size_of::<$node>() == $bytes);
+
+        // SAFETY: floats and integers alone, `repr(C)`, and no padding: the size above is the sum
+        // of the fields'.
+        unsafe impl Zeroable for $node {}
+        // SAFETY: as above.
+        unsafe impl Pod for $node {}
+
+        impl Sealed for $node {}
+
+        impl WideNode for $node {
+            const WIDTH: usize = $width;
+            type Slabs<S: Simd> = RaySlabs<$width, S::$vector>;
+            type Lanes<S: Simd> = S::$vector;
+
+            fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
+                Self::new(children)
+            }
+
+            #[inline(always)]
+            fn children(&self) -> &[Child] {
+                &self.children
+            }
+
+            fn child_aabb(&self, lane: usize) -> Aabb {
+                self.aabb(lane)
+            }
+
+            #[inline(always)]
+            fn slabs<S: Simd>(
+                token: S,
+                ray: &crate::geometry::PreparedRay,
+                bounds: &Aabb,
+            ) -> Self::Slabs<S> {
+                RaySlabs::new(token, ray, bounds)
+            }
+
+            #[inline(always)]
+            fn splat<S: Simd>(token: S, x: f32) -> Self::Lanes<S> {
+                S::$vector::splat(token, x)
+            }
+
+            #[inline(always)]
+            fn test<S: Simd>(
+                &self,
+                token: S,
+                slabs: &Self::Slabs<S>,
+                t_max: Self::Lanes<S>,
+            ) -> (u32, Self::Lanes<S>) {
+                slabs.test(token, &self.planes, t_max)
+            }
+
+            #[inline(always)]
+            fn lane<S: Simd>(lanes: &Self::Lanes<S>, lane: usize) -> f32 {
+                lanes.to_array()[lane & ($width - 1)]
+            }
+        }
+    };
+}
+
+impl_wide_node!(Node4, 4, F32x4, 112);
+impl_wide_node!(Node8, 8, F32x8, 224);
+
+impl<const W: usize, A> Node<W, A> {
+    fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
+        let mut node = Self {
+            align: [],
+            planes: [[[f32::INFINITY; W], [f32::NEG_INFINITY; W]]; 3],
+            children: [Child::EMPTY; W],
+        };
+        for (lane, (aabb, child)) in children.into_iter().take(W).enumerate() {
+            for axis in 0..3 {
+                node.planes[axis][0][lane] = aabb.min[axis];
+                node.planes[axis][1][lane] = aabb.max[axis];
+            }
+            node.children[lane] = child;
+        }
+        node
+    }
+
+    fn aabb(&self, lane: usize) -> Aabb {
+        if lane >= W {
+            return Aabb::EMPTY;
+        }
+        let side = |side: usize| [0, 1, 2].map(|axis| self.planes[axis][side][lane]).into();
+        Aabb::new(side(0), side(1))
+    }
+}

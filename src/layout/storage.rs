@@ -1,0 +1,27 @@
+//! Who owns a hierarchy's memory.
+
+use core::{marker::PhantomData, ops::Deref};
+
+/// Where the parts of a hierarchy lie: in vectors of its own, or in somebody else's memory.
+pub trait Storage {
+    /// A run of `T`.
+    type Slice<T: 'static + Clone>: Deref<Target = [T]> + Clone;
+}
+
+/// In vectors of its own.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Copy, Debug)]
+pub struct Owned;
+
+#[cfg(feature = "alloc")]
+impl Storage for Owned {
+    type Slice<T: 'static + Clone> = alloc::vec::Vec<T>;
+}
+
+/// In memory that is borrowed: flash, a mapped file, another hierarchy.
+#[derive(Clone, Copy, Debug)]
+pub struct Borrowed<'a>(PhantomData<&'a ()>);
+
+impl<'a> Storage for Borrowed<'a> {
+    type Slice<T: 'static + Clone> = &'a [T];
+}

@@ -1,0 +1,129 @@
+//! The contract in plain code: what every query must answer, bit for bit.
+//!
+//! No tree, no vectors: each primitive in turn. Slow, and the specification that the kernels are
+//! tested against.
+
+use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh, pow2};
+use crate::primitive::{PrimitiveHit, Primitives, custom};
+use glam::Vec3;
+
+/// The closest hit on a mesh: of all triangles that are hit within the ray's range the one of least `t`,
+/// of equal ones the one of least number. Triangles with a corner that is NaN or infinite are never hit.
+pub fn closest_hit(mesh: &TriangleMesh, ray: &Ray) -> Option<Hit> {
+    let prepared = PreparedRay::new(ray)?;
+    let mut best: Option<Hit> = None;
+    for (corners, primitive) in triangles(mesh).zip(0..) {
+        if let Some([t, u, v]) = intersect_triangle(&prepared, corners)
+            && best.is_none_or(|best| t < best.t)
+        {
+            best = Some(Hit { t, u, v, primitive });
+        }
+    }
+    best.map(|hit| Hit {
+        t: prepared.unscaled(hit.t, ray),
+        ..hit
+    })
+}
+
+/// Whether the ray hits any triangle of a mesh within its range.
+pub fn any_hit(mesh: &TriangleMesh, ray: &Ray) -> bool {
+    PreparedRay::new(ray).is_some_and(|prepared| {
+        triangles(mesh).any(|corners| intersect_triangle(&prepared, corners).is_some())
+    })
+}
+
+/// The closest hit on `count` primitives of a caller's own.
+pub fn closest_primitive<P: Primitives + ?Sized>(
+    primitives: &P,
+    count: u32,
+    ray: &Ray,
+) -> Option<PrimitiveHit<P::Detail>> {
+    let prepared = PreparedRay::new(ray)?;
+    let mut best: Option<PrimitiveHit<P::Detail>> = None;
+    for primitive in 0..count {
+        if let Some((t, detail)) = custom::intersect(primitives, primitive, ray, &prepared)
+            && best.is_none_or(|best| t < best.t)
+        {
+            best = Some(PrimitiveHit {
+                t,
+                primitive,
+                detail,
+            });
+        }
+    }
+    best.map(|hit| PrimitiveHit {
+        t: prepared.unscaled(hit.t, ray),
+        ..hit
+    })
+}
+
+fn triangles(mesh: &TriangleMesh) -> impl Iterator<Item = [Vec3; 3]> {
+    let corner = |i: u32| Vec3::from_array(mesh.positions()[i as usize]);
+    mesh.indices().iter().map(move |t| t.map(corner))
+}
+
+/// Scaled `t`, `u` and `v` at which a triangle is hit, if it is within the ray's range.
+///
+/// The formulas are those of the triangle test, a number at a time; the signs of the edge functions are
+/// found in `f64` without exception.
+fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]> {
+    if !corners.iter().all(|corner| corner.is_finite()) {
+        return None;
+    }
+    let [kx, ky, kz] = ray.axes;
+    let origin = Vec3::from_array(ray.origin);
+    let [a, b, c] = corners.map(|corner| corner - origin);
+    let shear = |p: Vec3| [p[kx] - ray.shear[0] * p[kz], p[ky] - ray.shear[1] * p[kz]];
+    let ([ax, ay], [bx, by], [cx, cy]) = (shear(a), shear(b), shear(c));
+
+    let cross64 = |px: f32, py: f32, qx: f32, qy: f32| {
+        f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)
+    };
+    let [wa, wb, wc] = [
+        cross64(cx, cy, bx, by),
+        cross64(ax, ay, cx, cy),
+        cross64(bx, by, ax, ay),
+    ];
+    let determinant = wa + wb + wc;
+    let inside = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
+    if !inside || determinant == 0.0 || !determinant.is_finite() {
+        return None;
+    }
+    let exact = [(wb / determinant) as f32, (wc / determinant) as f32];
+
+    // The weights of `f32`, where nothing in them vanishes, overflows or gets near to either.
+    let cross32 = |px: f32, py: f32, qx: f32, qy: f32| px * qy - py * qx;
+    let [wa, wb, wc] = [
+        cross32(cx, cy, bx, by),
+        cross32(ax, ay, cx, cy),
+        cross32(bx, by, ax, ay),
+    ];
+    let determinant = wa + wb + wc;
+    let size = determinant.abs();
+    let ordinary = wa != 0.0 && wb != 0.0 && wc != 0.0 && size > pow2(-100) && size < pow2(126);
+    let [u, v] = if ordinary {
+        [wb / determinant, wc / determinant]
+    } else {
+        exact
+    };
+
+    let z = a[kz] + u * (b[kz] - a[kz]) + v * (c[kz] - a[kz]);
+    let t = z * ray.reciprocal[kz];
+    if !t.is_finite() {
+        return None;
+    }
+
+    // Into the interval in which the ray meets the triangle's own box.
+    let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+    let largest = lo.abs().max(hi.abs()).max_element().max(pow2(-70));
+    let error = 12.0 * pow2(-24) * largest;
+    let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
+    for axis in 0..3 {
+        let r = ray.reciprocal[axis];
+        let e = error * r.abs();
+        near = near.max((lo[axis] * r).min(hi[axis] * r) - e);
+        far = far.min((lo[axis] * r).max(hi[axis] * r) + e);
+    }
+    let t = t.max(near).min(far) + 0.0;
+    (t.is_finite() && ray.t_min <= t && t <= ray.t_max).then_some([t, u + 0.0, v + 0.0])
+}

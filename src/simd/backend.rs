@@ -1,0 +1,87 @@
+//! The choice of instruction set when running.
+
+#[cfg(target_arch = "x86_64")]
+use super::Avx2;
+use super::{Portable, Simd};
+use core::fmt;
+
+/// A set of instructions that this processor has.
+///
+/// Hierarchies choose the fastest by themselves; every backend gives the same answers, bit for bit, so
+/// another is of use to compare and to test alone.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Backend(Kind);
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+}
+
+/// Something to be done with vectors, whatever the backend.
+pub trait Operation {
+    /// What comes of it.
+    type Output;
+    /// Does it. To be marked `#[inline(always)]`, or the backend's instructions do not reach it.
+    fn run<S: Simd>(self, token: S) -> Self::Output;
+}
+
+impl Backend {
+    /// What the program was compiled for: SSE2, NEON or simd128 where the target has it, else scalar.
+    pub const PORTABLE: Self = Self(Kind::Portable);
+
+    /// The fastest backend of this processor.
+    #[inline]
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = Avx2::detect() {
+            return Self(Kind::Avx2(avx2));
+        }
+        Self::PORTABLE
+    }
+
+    /// Every backend of this processor, the fastest first.
+    pub fn available() -> impl Iterator<Item = Self> {
+        let best = Self::detect();
+        core::iter::once(best).chain((best != Self::PORTABLE).then_some(Self::PORTABLE))
+    }
+
+    /// A short name: `portable` or `avx2`.
+    pub const fn name(self) -> &'static str {
+        match self.0 {
+            Kind::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2(_) => "avx2",
+        }
+    }
+
+    /// Does `operation` with this backend's instructions: one predictable branch.
+    #[inline(always)]
+    pub(crate) fn run<O: Operation>(self, operation: O) -> O::Output {
+        match self.0 {
+            Kind::Portable => operation.run(Portable),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the token says that the processor has these instructions.
+            Kind::Avx2(avx2) => unsafe { run_avx2(operation, avx2) },
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
+fn run_avx2<O: Operation>(operation: O, token: Avx2) -> O::Output {
+    operation.run(token)
+}
+
+impl Default for Backend {
+    fn default() -> Self {
+        Self::detect()
+    }
+}
+
+impl fmt::Debug for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

@@ -1,0 +1,74 @@
+//! The backend of any machine, over the `wide` crate: SSE2, NEON, simd128 or scalar, as compiled for.
+
+use super::{Simd, Vector};
+use wide::{f32x4, f32x8};
+
+/// The instructions that the program was compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Portable;
+
+impl Simd for Portable {
+    type F32x4 = f32x4;
+    type F32x8 = f32x8;
+}
+
+macro_rules! impl_vector {
+    ($vector:ty, $n:literal) => {
+        impl Vector<$n> for $vector {
+            type Token = Portable;
+
+            #[inline(always)]
+            fn splat(_: Portable, x: f32) -> Self {
+                <$vector>::splat(x)
+            }
+            #[inline(always)]
+            fn load(_: Portable, lanes: &[f32; $n]) -> Self {
+                <$vector>::new(*lanes)
+            }
+            #[inline(always)]
+            fn to_array(self) -> [f32; $n] {
+                self.to_array()
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, addend: Self) -> Self {
+                self * factor + addend
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                self.fast_min(other)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.fast_max(other)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> Self {
+                self.simd_lt(other)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> Self {
+                self.simd_le(other)
+            }
+            #[inline(always)]
+            fn select(self, yes: Self, no: Self) -> Self {
+                <$vector>::bitselect(self, yes, no)
+            }
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                self.to_bitmask()
+            }
+            #[inline(always)]
+            fn permute(self, lanes: &[u8; $n]) -> Self {
+                let from = self.to_array();
+                <$vector>::new(lanes.map(|lane| from[lane as usize % $n]))
+            }
+        }
+    };
+}
+
+impl_vector!(f32x4, 4);
+impl_vector!(f32x8, 8);

@@ -1,0 +1,53 @@
+//! What a backend offers.
+
+use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
+
+/// A proof that the processor has a backend's instructions.
+pub trait Simd: Copy {
+    /// Four floats.
+    type F32x4: Vector<4, Token = Self>;
+    /// Eight floats.
+    type F32x8: Vector<8, Token = Self>;
+}
+
+/// `N` floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.
+pub trait Vector<const N: usize>:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+{
+    /// The backend it belongs to.
+    type Token: Simd;
+
+    /// `x` in every lane.
+    fn splat(token: Self::Token, x: f32) -> Self;
+    /// One lane from each element.
+    fn load(token: Self::Token, lanes: &[f32; N]) -> Self;
+    /// The lanes as an array.
+    fn to_array(self) -> [f32; N];
+
+    /// `self * factor + addend`, rounded once or twice.
+    fn mul_add(self, factor: Self, addend: Self) -> Self;
+    /// The lesser; either where they are equal.
+    fn min(self, other: Self) -> Self;
+    /// The greater; either where they are equal.
+    fn max(self, other: Self) -> Self;
+    /// Without the sign.
+    fn abs(self) -> Self;
+
+    /// Where `self < other`; not beside a NaN.
+    fn lt(self, other: Self) -> Self;
+    /// Where `self <= other`; not beside a NaN.
+    fn le(self, other: Self) -> Self;
+    /// `self` is a comparison's outcome: `yes` where it is set, else `no`.
+    fn select(self, yes: Self, no: Self) -> Self;
+    /// `self` is a comparison's outcome: bit `i` is lane `i`, the bits above are zero.
+    fn bits(self) -> u32;
+
+    /// Lane `i` becomes lane `lanes[i]` modulo `N`.
+    fn permute(self, lanes: &[u8; N]) -> Self;
+}

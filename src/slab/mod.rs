@@ -1,0 +1,165 @@
+//! Ray against axis-aligned boxes: the slab test, one multiply-add a plane, that never loses a hit.
+//!
+//! # Why it never loses a hit
+//!
+//! Let u = 2^-24, o the ray's origin, d its scaled direction (largest component in [1, 2)), r its
+//! reciprocals, D the largest over the axes of |scene bound| + |o|. A box plane p is met at
+//!
+//! ```text
+//! near = p·r + (-(o·r) - E),  far = p·r + (-(o·r) + E),  E = K_BOX·u·D·|r|
+//! ```
+//!
+//! and the box is passed when max(near, t_min) <= min(far, t_max). The triangle test ends by putting t
+//! into the interval [n, f] of the triangle's own box by one fixed formula:
+//!
+//! ```text
+//! n = max over axes of ((lo - o)·r - e),  f = min over axes of ((hi - o)·r + e),
+//! e = K_PRIMITIVE·u·M·|r|
+//! ```
+//!
+//! with M the largest |vertex - o| of any axis (for r < 0, lo and hi change places, here as above).
+//!
+//! *(1) n and f are in order, and a point of the ray that meets the triangle lies between.* The edge
+//! functions have exact signs, so an accepted triangle, sheared *as computed*, holds 0: weights w >= 0
+//! of sum 1 exist with Σ w·x' = 0 and Σ w·y' = 0 exactly. A sheared x' = fl(X - fl(s·Z)), where X and Z
+//! are rounded differences and s a rounded quotient, is off from the exact shear by at most
+//! u·|X| (difference) + 3u·|Z| (difference, quotient, product; |s| <= 1) + u·(|X| + |Z|) (last
+//! difference) <= 6u·M. So at t* = Σ w·Z / d.z the ray is within 6u·M, on each axis, of the point
+//! Σ w·vertex of the triangle, and exactly there along z. Hence (lo - o) - 6u·M <= d·t* <= (hi - o) + 6u·M,
+//! and, multiplied by |r|: exact n - 6u·M·|r| <= t* <= exact f + 6u·M·|r| on each axis. Computing
+//! (lo - o)·r - e adds at most u·M·|r| each for the difference, the reciprocal, the product and the last
+//! difference. 6 + 4 = 10, and second-order terms are far below 1: **K_PRIMITIVE = 12** gives
+//! n <= t* <= f on every pair of axes.
+//!
+//! *(2) The same where r was cut off* at R = 2^48, that is |d| < 1/R: multiplied by R, the inequality reads
+//! (lo - o)·R <= d·R·t* + 6u·M·R with |d·R| <= 1, so |t*| has to fit in what is left of K_PRIMITIVE,
+//! 12 - 6 - 3 > 2 u·M·R = 2^25·M. And |t*| <= M / |d.z| <= 2^23·M, for d.z is at least 2^-23 even for
+//! denormal directions. This is why R is not smaller.
+//!
+//! *(3) near(box) <= n <= t and t <= f <= far(box) for each box above.* Bounds of a box are no tighter
+//! than the triangle's, and each formula is monotone in the plane, rounding included, so it is enough
+//! to compare the two formulas on one plane. near, with or without a fused operation, is off by at most
+//! u·|p·r| + u·|o·r| (products), u·(|o·r| + E) (constant), u·(D·|r| + E) (sum) <= 3u·D·|r| + 2u·E from
+//! p·r - o·r - E; n by 3u·M·|r| + u·e from its own value with e, as counted in (1) without the
+//! reciprocal, which both share. M <= D(1 + u). So E - e >= 6u·D·|r| is enough: 12 + 6, and 2 more for
+//! the rounding of D, M, E and e themselves: **K_BOX = 20**.
+//!
+//! *(4) Nothing overflows or turns NaN.* For D < 2^77, |p·r| and |o·r| are below 2^125. Beyond, far from
+//! any scene that floats can describe, the slabs are opened so wide that every box is passed: slow, and
+//! right. Below, D and M are never taken as less than 2^-70, which covers the absolute error of
+//! results that are denormal, or flushed to zero by a program that has asked for it.
+//!
+//! The pass itself follows: t_min <= t <= t_max for a hit that counts, near <= t on each axis and
+//! t <= far on each, so max(near, t_min) <= t <= min(far, t_max). An empty lane (lo = ∞, hi = -∞) has
+//! near = ∞ and is never passed.
+//!
+//! The known ways are Williams et al., "An Efficient and Robust Ray-Box Intersection Algorithm" (2005),
+//! and Ize, "Robust BVH Ray Traversal" (2013), which widens far by two ULPs; they cover the rounding
+//! of the box test, not that of the triangle test.
+
+use crate::{
+    geometry::{Aabb, PreparedRay, pow2},
+    simd::Vector,
+};
+
+/// Half the distance from 1 to the next float: the relative error of one rounding.
+const UNIT_ROUNDOFF: f32 = pow2(-24);
+/// Margin of the box test: derived above.
+const K_BOX: f32 = 20.0;
+/// Margin of a primitive's own interval: derived above.
+const K_PRIMITIVE: f32 = 12.0;
+/// No distance is taken to be smaller when errors are estimated: (4) above.
+const MIN_EXTENT: f32 = pow2(-70);
+/// Up to here nothing overflows: (4) above.
+const MAX_EXTENT: f32 = pow2(77);
+
+/// What the box test needs of a ray and a scene, in every lane: 9 vectors, kept in registers.
+#[derive(Clone, Copy)]
+pub struct RaySlabs<const N: usize, V> {
+    reciprocal: [V; 3],
+    near: [V; 3],
+    far: [V; 3],
+    t_min: V,
+    /// 1 where the direction is negative: which of a box's two planes is met first.
+    negative: [usize; 3],
+}
+
+/// The planes of `N` boxes: by axis, then `min` and `max`, then box.
+pub type Planes<const N: usize> = [[[f32; N]; 2]; 3];
+
+impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
+    /// For boxes within `bounds`.
+    #[inline(always)]
+    pub(crate) fn new(token: V::Token, ray: &PreparedRay, bounds: &Aabb) -> Self {
+        let scene = bounds.min.abs().max(bounds.max.abs()).to_array();
+        let mut extent = MIN_EXTENT;
+        for (bound, origin) in scene.into_iter().zip(ray.origin) {
+            extent = extent.max(bound + origin.abs());
+        }
+        let per_axis = core::array::from_fn::<_, 3, _>(|axis| {
+            let r = ray.reciprocal[axis];
+            if extent < MAX_EXTENT {
+                let error = K_BOX * UNIT_ROUNDOFF * extent * r.abs();
+                let at_origin = -(ray.origin[axis] * r);
+                (r, at_origin - error, at_origin + error)
+            } else {
+                (pow2(-126).copysign(r), -f32::MAX, f32::MAX)
+            }
+        });
+        Self {
+            reciprocal: per_axis.map(|(r, _, _)| V::splat(token, r)),
+            near: per_axis.map(|(_, near, _)| V::splat(token, near)),
+            far: per_axis.map(|(_, _, far)| V::splat(token, far)),
+            t_min: V::splat(token, ray.t_min),
+            negative: ray.reciprocal.map(|r| r.is_sign_negative() as usize),
+        }
+    }
+
+    /// Which of the boxes the ray may meet up to `t_max`, a bit each, and from which `t` on.
+    #[inline(always)]
+    pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (u32, V) {
+        let [(near_x, far_x), (near_y, far_y), (near_z, far_z)] = [0, 1, 2].map(|axis| {
+            let first = self.negative[axis] & 1;
+            let plane = |side: usize| V::load(token, &planes[axis][side]);
+            let r = self.reciprocal[axis];
+            (
+                plane(first).mul_add(r, self.near[axis]),
+                plane(first ^ 1).mul_add(r, self.far[axis]),
+            )
+        });
+        let near = near_x.max(near_y).max(near_z.max(self.t_min));
+        let far = far_x.min(far_y).min(far_z.min(t_max));
+        (near.le(far).bits(), near)
+    }
+}
+
+/// The interval of `t` within which a primitive's own bounds are met, for the hit to be put into: (1) above.
+/// `reciprocal` is the ray's; `lo` and `hi` are the bounds less the ray's origin, axis by axis in the same order.
+///
+/// One fixed formula, so that every backend finds the same bits.
+#[inline(always)]
+pub(crate) fn primitive_interval<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    reciprocal: [f32; 3],
+    lo: [V; 3],
+    hi: [V; 3],
+) -> (V, V) {
+    let mut extent = V::splat(token, MIN_EXTENT);
+    for axis in 0..3 {
+        extent = extent.max(lo[axis].abs()).max(hi[axis].abs());
+    }
+    let error = V::splat(token, K_PRIMITIVE * UNIT_ROUNDOFF) * extent;
+    let mut near = V::splat(token, f32::NEG_INFINITY);
+    let mut far = V::splat(token, f32::INFINITY);
+    for axis in 0..3 {
+        let r = V::splat(token, reciprocal[axis]);
+        let (a, b) = (lo[axis] * r, hi[axis] * r);
+        let e = error * r.abs();
+        let (enter, leave) = (a.min(b) - e, a.max(b) + e);
+        // Not `max` and `min`: where both terms have overflowed their difference is NaN, which is to
+        // be passed over on every backend alike.
+        near = near.lt(enter).select(enter, near);
+        far = leave.lt(far).select(leave, far);
+    }
+    (near, far)
+}

@@ -1,0 +1,40 @@
+//! What a query cost.
+
+use super::single::Visitor;
+use crate::layout::Leaf;
+use core::ops::ControlFlow;
+
+/// How much a query looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Nodes whose boxes were tested.
+    pub nodes: u32,
+    /// Leaves reached.
+    pub leaves: u32,
+    /// Primitives in these leaves.
+    pub triangles: u32,
+}
+
+/// A visitor that counts what another one meets.
+pub(super) struct Counting<V> {
+    pub(super) visitor: V,
+    pub(super) counts: Counts,
+}
+
+impl<L: Leaf, V: Visitor<L>> Visitor<L> for Counting<V> {
+    const NEAREST_FIRST: bool = V::NEAREST_FIRST;
+
+    #[inline(always)]
+    fn node(&mut self) {
+        self.counts.nodes += 1;
+        self.visitor.node();
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, leaf: &L) -> ControlFlow<(), f32> {
+        let primitives = leaf.primitives();
+        self.counts.leaves += 1;
+        self.counts.triangles += (primitives.end - primitives.start) as u32;
+        self.visitor.leaf(leaf)
+    }
+}

@@ -1,0 +1,114 @@
+//! Closest hit and any hit over a caller's primitives.
+
+use super::single::{Visitor, walk};
+use crate::{
+    geometry::{PreparedRay, Ray},
+    layout::{Bvh, PrimitiveLeaf, Storage, WideNode},
+    primitive::{PrimitiveHit, Primitives, custom::intersect},
+    simd::{Operation, Simd},
+};
+use core::ops::ControlFlow;
+
+impl<N: WideNode, S: Storage> Bvh<N, PrimitiveLeaf, S> {
+    /// The closest primitive that the ray hits: of all within its range the one of least `t`, of equal
+    /// ones the one of least number. `primitives` are those that the hierarchy was built on.
+    #[inline]
+    pub fn closest_hit<P: Primitives + ?Sized>(
+        &self,
+        primitives: &P,
+        ray: &Ray,
+    ) -> Option<PrimitiveHit<P::Detail>> {
+        let prepared = PreparedRay::new(ray)?;
+        let hit = self.backend().run(Query::<_, _, _, true> {
+            bvh: self,
+            primitives,
+            ray,
+            prepared: &prepared,
+        })?;
+        Some(PrimitiveHit {
+            t: prepared.unscaled(hit.t, ray),
+            ..hit
+        })
+    }
+
+    /// Whether the ray hits anything within its range: just when [`closest_hit`](Self::closest_hit)
+    /// finds something, and sooner.
+    #[inline]
+    pub fn any_hit<P: Primitives + ?Sized>(&self, primitives: &P, ray: &Ray) -> bool {
+        PreparedRay::new(ray).is_some_and(|prepared| {
+            let query = Query::<_, _, _, false> {
+                bvh: self,
+                primitives,
+                ray,
+                prepared: &prepared,
+            };
+            self.backend().run(query).is_some()
+        })
+    }
+}
+
+/// The closest hit if `CLOSEST`, else the first that is met.
+struct Query<'a, N: WideNode, S: Storage, P: ?Sized, const CLOSEST: bool> {
+    bvh: &'a Bvh<N, PrimitiveLeaf, S>,
+    primitives: &'a P,
+    ray: &'a Ray,
+    prepared: &'a PreparedRay,
+}
+
+impl<N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> Operation
+    for Query<'_, N, S, P, CLOSEST>
+{
+    /// `t` is scaled.
+    type Output = Option<PrimitiveHit<P::Detail>>;
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) -> Self::Output {
+        let (bvh, prepared) = (self.bvh, self.prepared);
+        let mut visitor = PrimitiveVisitor {
+            query: self,
+            found: None,
+        };
+        walk(token, bvh, prepared, &mut visitor);
+        visitor.found
+    }
+}
+
+struct PrimitiveVisitor<'a, N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> {
+    query: Query<'a, N, S, P, CLOSEST>,
+    found: Option<PrimitiveHit<P::Detail>>,
+}
+
+impl<N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> Visitor<PrimitiveLeaf>
+    for PrimitiveVisitor<'_, N, S, P, CLOSEST>
+{
+    const NEAREST_FIRST: bool = CLOSEST;
+
+    #[inline(always)]
+    fn leaf(&mut self, leaf: &PrimitiveLeaf) -> ControlFlow<(), f32> {
+        let Query {
+            bvh,
+            primitives,
+            ray,
+            prepared,
+        } = self.query;
+        for &primitive in &bvh.primitives()[leaf.range()] {
+            let Some((t, detail)) = intersect(primitives, primitive, ray, prepared) else {
+                continue;
+            };
+            let closer = self
+                .found
+                .is_none_or(|best| t < best.t || t == best.t && primitive < best.primitive);
+            if closer {
+                self.found = Some(PrimitiveHit {
+                    t,
+                    primitive,
+                    detail,
+                });
+                if !CLOSEST {
+                    return ControlFlow::Break(());
+                }
+            }
+        }
+        ControlFlow::Continue(self.found.map_or(prepared.t_max, |best| best.t))
+    }
+}
