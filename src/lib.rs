@@ -1,11 +1,49 @@
 #![no_std]
-//! Wide bounding volume hierarchies.
+//! Ray queries over wide bounding volume hierarchies: which primitive does this ray hit first, and is
+//! anything in the way.
+//!
+//! ```
+//! use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}};
+//!
+//! let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+//! let indices = [[0, 1, 2_u32]];
+//! let mesh = TriangleMesh::new(&positions, &indices)?;
+//! let bvh = Builder::new().build(&mesh)?;
+//!
+//! let hit = bvh.closest_hit(&Ray::new([0.25, 0.25, 0.0], [0.0, 0.0, 1.0])).unwrap();
+//! assert_eq!((hit.primitive, hit.t), (0, 5.0));
+//! assert!(!bvh.any_hit(&Ray::segment([0.25, 0.25, 0.0], [0.25, 0.25, 4.0])));
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+//!
+//! # What is promised
+//!
+//! 1. The answer of [`reference`], bit for bit: of all primitives hit within the ray's range the one
+//!    of least `t`, of equal ones the one of least number. The tree, its width, the processor and the
+//!    number of threads that built it change nothing.
+//! 2. No ray slips through a closed mesh whose triangles share their vertices' positions.
+//! 3. Numbers that are no numbers are answers, not accidents: a ray that makes no sense hits nothing, and no
+//!    input to a safe function panics, hangs or reads out of bounds.
+//!
+//! # Where things are
+//!
+//! [`geometry`] has the boxes, rays, hits and meshes; [`build`] makes a hierarchy (with the feature `std`);
+//! [`layout`] says how it lies in memory; [`traverse`] documents the queries, which are methods of
+//! [`layout::Bvh`]; [`primitive`] is for a caller's own primitives; [`simd`] chooses the instructions.
+//!
+//! # Features
+//!
+//! - `std` (default): the builder.
+//! - `alloc`: hierarchies that own their memory. Without it they are borrowed slices.
+//! - `rayon`: builds on all cores. The tree is the same, bit for bit.
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+#[cfg(feature = "std")]
+pub mod build;
 pub mod geometry;
 pub mod layout;
 pub mod primitive;
@@ -14,5 +52,7 @@ pub mod simd;
 mod slab;
 pub mod traverse;
 
-//#[cfg(feature = "std")]
-//pub mod build;
+/// The README's code, run as tests.
+#[cfg(all(doctest, feature = "std"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -3,18 +3,20 @@
 //! No tree, no vectors: each primitive in turn. Slow, and the specification that the kernels are
 //! tested against.
 
-use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh, pow2};
+use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh, is_degenerate, pow2};
 use crate::primitive::{PrimitiveHit, Primitives, custom};
 use glam::Vec3;
 
 /// The closest hit on a mesh: of all triangles that are hit within the ray's range the one of least `t`,
-/// of equal ones the one of least number. Triangles with a corner that is NaN or infinite are never hit.
+/// of equal ones the one of least number. Triangles with a corner that is NaN or infinite are never hit, nor
+/// those whose corners lie on one line.
 pub fn closest_hit(mesh: &TriangleMesh, ray: &Ray) -> Option<Hit> {
     let prepared = PreparedRay::new(ray)?;
     let mut best: Option<Hit> = None;
     for (corners, primitive) in triangles(mesh).zip(0..) {
         if let Some([t, u, v]) = intersect_triangle(&prepared, corners)
             && best.is_none_or(|best| t < best.t)
+            && !is_degenerate(corners)
         {
             best = Some(Hit { t, u, v, primitive });
         }
@@ -28,7 +30,9 @@ pub fn closest_hit(mesh: &TriangleMesh, ray: &Ray) -> Option<Hit> {
 /// Whether the ray hits any triangle of a mesh within its range.
 pub fn any_hit(mesh: &TriangleMesh, ray: &Ray) -> bool {
     PreparedRay::new(ray).is_some_and(|prepared| {
-        triangles(mesh).any(|corners| intersect_triangle(&prepared, corners).is_some())
+        triangles(mesh).any(|corners| {
+            intersect_triangle(&prepared, corners).is_some() && !is_degenerate(corners)
+        })
     })
 }
 

@@ -1,12 +1,14 @@
 //! What a scene is made of and what is asked of it: boxes, rays, hits, triangle meshes.
 
 mod aabb;
+mod degenerate;
 mod hit;
 mod mesh;
 mod prepared;
 mod ray;
 
 pub use aabb::Aabb;
+pub(crate) use degenerate::is_degenerate;
 pub use hit::Hit;
 pub use mesh::{MeshError, Position, TriangleIndices, TriangleMesh};
 pub(crate) use prepared::{PreparedRay, pow2};

@@ -79,9 +79,27 @@ impl TriangleLeaf {
         t_max: f32,
     ) -> Option<TriangleHits<T::F32x8>> {
         let vertices = ray.shear(token, &self.vertices);
-        let corner = |vertices: T::F32x8, i: usize| vertices.permute(&self.corners[i]);
-        let t_max = T::F32x8::splat(token, t_max);
-        ray.test(token, &vertices, corner, self.lanes(), t_max)
+        let crossed = ray.cross(
+            token,
+            self.corners_of(vertices.x),
+            self.corners_of(vertices.y),
+            self.lanes(),
+        )?;
+        let [x, y, z] = vertices.relative;
+        let ([ax, bx, cx], [ay, by, cy], [az, bz, cz]) =
+            (self.corners_of(x), self.corners_of(y), self.corners_of(z));
+        let corners = [[ax, ay, az], [bx, by, bz], [cx, cy, cz]];
+        ray.hit(token, crossed, corners, T::F32x8::splat(token, t_max))
+    }
+
+    /// A number of each vertex as that of each triangle's first, second and third corner.
+    #[inline(always)]
+    fn corners_of<V: Vector<8>>(&self, vertices: V) -> [V; 3] {
+        [
+            vertices.permute(&self.corners[0]),
+            vertices.permute(&self.corners[1]),
+            vertices.permute(&self.corners[2]),
+        ]
     }
 
     /// Where its primitives' numbers begin.

@@ -36,7 +36,7 @@ impl Primitives for Spheres<'_> {
         let nearest = to_center.dot(d) / dd;
         let offset = to_center - nearest * d;
         let square = f64::from(sphere.radius) * f64::from(sphere.radius) - offset.dot(offset);
-        if !(square >= 0.0) {
+        if square.is_nan() || square < 0.0 {
             return None;
         }
         let half = wide::f64x2::splat(square / dd).sqrt().to_array()[0];

@@ -16,7 +16,7 @@
 
 use crate::{
     geometry::{PreparedRay, pow2},
-    simd::Vector,
+    simd::{Vector, splat3},
     slab::primitive_interval,
 };
 
@@ -30,13 +30,22 @@ pub struct RayShear<const N: usize, V> {
     t_min: V,
 }
 
-/// Vertices (one a lane) as the ray sees them.
+/// Vertices, one a lane, as the ray sees them.
 #[derive(Clone, Copy)]
 pub struct Sheared<V> {
     /// Less the ray's origin, along the axes of the shear.
-    relative: [V; 3],
+    pub relative: [V; 3],
     /// x and y after the shear.
-    sheared: [V; 2],
+    pub x: V,
+    pub y: V,
+}
+
+/// Triangles, one a lane, that the line of the ray goes through.
+pub struct Crossed<V> {
+    /// Which triangles, a bit each. The weights are meaningful in these lanes alone.
+    mask: u32,
+    u: V,
+    v: V,
 }
 
 /// What a ray found among `N` triangles.
@@ -55,11 +64,15 @@ const MAX_DETERMINANT: f32 = pow2(126);
 impl<const N: usize, V: Vector<N>> RayShear<N, V> {
     #[inline(always)]
     pub(crate) fn new(token: V::Token, ray: &PreparedRay) -> Self {
+        let along = |values: [f32; 3]| ray.axes.map(|axis| values[axis]);
         Self {
-            origin: ray.axes.map(|axis| V::splat(token, ray.origin[axis])),
-            shear: ray.shear.map(|s| V::splat(token, s)),
+            origin: splat3(token, along(ray.origin)),
+            shear: [
+                V::splat(token, ray.shear[0]),
+                V::splat(token, ray.shear[1]),
+            ],
             axes: ray.axes,
-            reciprocal: ray.axes.map(|axis| ray.reciprocal[axis]),
+            reciprocal: along(ray.reciprocal),
             t_min: V::splat(token, ray.t_min),
         }
     }
@@ -67,32 +80,28 @@ impl<const N: usize, V: Vector<N>> RayShear<N, V> {
     /// Moves and shears vertices, given as arrays of x, of y and of z.
     #[inline(always)]
     pub(crate) fn shear(&self, token: V::Token, vertices: &[[f32; N]; 3]) -> Sheared<V> {
-        let [x, y, z] = [0, 1, 2].map(|i| {
-            // The axes are 0 to 2; `min` tells the compiler.
-            V::load(token, &vertices[self.axes[i].min(2)]) - self.origin[i]
-        });
+        // The axes are 0 to 2; `min` tells the compiler.
+        let x = V::load(token, &vertices[self.axes[0].min(2)]) - self.origin[0];
+        let y = V::load(token, &vertices[self.axes[1].min(2)]) - self.origin[1];
+        let z = V::load(token, &vertices[self.axes[2].min(2)]) - self.origin[2];
         Sheared {
             relative: [x, y, z],
-            sheared: [x - self.shear[0] * z, y - self.shear[1] * z],
+            x: x - self.shear[0] * z,
+            y: y - self.shear[1] * z,
         }
     }
 
-    /// The test: `corner(i)` picks corner `i` of each triangle out of a vector of vertices, `lanes`
-    /// has a bit for each lane that holds a triangle, `t_max` is the greatest `t` that counts.
+    /// The first half of the test: the triangles, of those that `lanes` has a bit for, that the line of
+    /// the ray goes through. `x` and `y` are the three corners after the shear.
     #[inline(always)]
-    pub(crate) fn test(
+    pub(crate) fn cross(
         &self,
         token: V::Token,
-        vertices: &Sheared<V>,
-        corner: impl Fn(V, usize) -> V,
+        [ax, bx, cx]: [V; 3],
+        [ay, by, cy]: [V; 3],
         lanes: u32,
-        t_max: V,
-    ) -> Option<TriangleHits<V>> {
+    ) -> Option<Crossed<V>> {
         let zero = V::splat(token, 0.0);
-        let corners = |vector: V| [0, 1, 2].map(|i| corner(vector, i));
-        let [ax, bx, cx] = corners(vertices.sheared[0]);
-        let [ay, by, cy] = corners(vertices.sheared[1]);
-
         let wa = cx * by - cy * bx;
         let wb = ax * cy - ay * cx;
         let wc = bx * ay - by * ax;
@@ -110,39 +119,41 @@ impl<const N: usize, V: Vector<N>> RayShear<N, V> {
             & V::splat(token, MIN_DETERMINANT).lt(determinant.abs());
         let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
-        let doubtful = candidates & !mask;
-        if doubtful != 0 {
-            let corners = [ax, ay, bx, by, cx, cy].map(V::to_array);
+        if mask != candidates {
             let (mut us, mut vs) = (u.to_array(), v.to_array());
-            for lane in bits(doubtful) {
-                if let Some(weights) = exact_weights(corners.map(|c| c[lane])) {
-                    [us[lane], vs[lane]] = weights;
-                    mask |= 1 << lane;
-                }
-            }
+            let corners = [ax, ay, bx, by, cx, cy];
+            mask |= exact_lanes(candidates & !mask, to_arrays(corners), &mut us, &mut vs);
             (u, v) = (V::load(token, &us), V::load(token, &vs));
         }
-        if mask == 0 {
-            return None;
-        }
+        (mask != 0).then_some(Crossed { mask, u, v })
+    }
 
-        let relative = vertices.relative.map(corners);
-        let [az, bz, cz] = relative[2];
-        let z = az + u * (bz - az) + v * (cz - az);
+    /// The second half: where the crossed triangles are hit, if that is within the ray's range up to
+    /// `t_max`. `corners` are what [`Sheared::relative`] says of the three corners.
+    #[inline(always)]
+    pub(crate) fn hit(
+        &self,
+        token: V::Token,
+        Crossed { mask, u, v }: Crossed<V>,
+        corners: [[V; 3]; 3],
+        t_max: V,
+    ) -> Option<TriangleHits<V>> {
+        let zero = V::splat(token, 0.0);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
+        let t = (az + u * (bz - az) + v * (cz - az)) * V::splat(token, self.reciprocal[2]);
+        // Before `t` is moved, too, for that would hide a NaN on some backends.
+        let infinity = V::splat(token, f32::INFINITY);
+        let finite = t.abs().lt(infinity);
         let (near, far) = primitive_interval(
             token,
             self.reciprocal,
-            relative.map(|[a, b, c]| a.min(b).min(c)),
-            relative.map(|[a, b, c]| a.max(b).max(c)),
+            [ax.min(bx).min(cx), ay.min(by).min(cy), az.min(bz).min(cz)],
+            [ax.max(bx).max(cx), ay.max(by).max(cy), az.max(bz).max(cz)],
         );
-        let t = z * V::splat(token, self.reciprocal[2]);
-        let is_finite = |t: V| t.abs().lt(V::splat(token, f32::INFINITY));
-        // Before `t` is moved, too, for that would hide a NaN on some backends.
-        let finite = is_finite(t);
         // Adding 0 turns -0 into 0, whose sign `min` and `max` leave open.
         let t = t.max(near).min(far) + zero;
-        let in_range = self.t_min.le(t) & t.le(t_max) & finite & is_finite(t);
-        mask &= in_range.bits();
+        let in_range = self.t_min.le(t) & t.le(t_max) & finite & t.abs().lt(infinity);
+        let mask = mask & in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,
             t,
@@ -152,11 +163,40 @@ impl<const N: usize, V: Vector<N>> RayShear<N, V> {
     }
 }
 
-/// The weights of the second and the third corner by the exact signs of the edge functions, or `None` for
-/// a miss. The arguments are x and y of the sheared corners.
+#[inline(always)]
+fn to_arrays<const N: usize, V: Vector<N>>([a, b, c, d, e, f]: [V; 6]) -> [[f32; N]; 6] {
+    [
+        a.to_array(),
+        b.to_array(),
+        c.to_array(),
+        d.to_array(),
+        e.to_array(),
+        f.to_array(),
+    ]
+}
+
+/// Which of `lanes` are crossed by the exact signs; their weights are written.
 #[cold]
 #[inline(never)]
-pub(crate) fn exact_weights(corners: [f32; 6]) -> Option<[f32; 2]> {
+fn exact_lanes<const N: usize>(
+    lanes: u32,
+    corners: [[f32; N]; 6],
+    u: &mut [f32; N],
+    v: &mut [f32; N],
+) -> u32 {
+    let mut mask = 0;
+    for lane in bits(lanes) {
+        if let Some(weights) = exact_weights(corners.map(|c| c[lane])) {
+            [u[lane], v[lane]] = weights;
+            mask |= 1 << lane;
+        }
+    }
+    mask
+}
+
+/// The weights of the second and the third corner by the exact signs of the edge functions, or `None` for
+/// a miss. The arguments are x and y of the sheared corners.
+fn exact_weights(corners: [f32; 6]) -> Option<[f32; 2]> {
     let [ax, ay, bx, by, cx, cy] = corners.map(f64::from);
     let wa = cx * by - cy * bx;
     let wb = ax * cy - ay * cx;

@@ -19,4 +19,4 @@ pub(crate) use avx2::Avx2;
 pub use backend::Backend;
 pub(crate) use backend::Operation;
 pub(crate) use portable::Portable;
-pub(crate) use vector::{Simd, Vector};
+pub(crate) use vector::{Simd, Vector, splat3};

@@ -51,3 +51,15 @@ pub trait Vector<const N: usize>:
     /// Lane `i` becomes lane `lanes[i]` modulo `N`.
     fn permute(self, lanes: &[u8; N]) -> Self;
 }
+
+/// Three numbers, each in every lane of its vector.
+//
+// Not a closure given to `map`: closures do not inherit a backend's instructions and stay calls.
+#[inline(always)]
+pub fn splat3<const N: usize, V: Vector<N>>(token: V::Token, [x, y, z]: [f32; 3]) -> [V; 3] {
+    [
+        V::splat(token, x),
+        V::splat(token, y),
+        V::splat(token, z),
+    ]
+}

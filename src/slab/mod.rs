@@ -59,7 +59,7 @@
 
 use crate::{
     geometry::{Aabb, PreparedRay, pow2},
-    simd::Vector,
+    simd::{Vector, splat3},
 };
 
 /// Half the distance from 1 to the next float: the relative error of one rounding.
@@ -96,20 +96,22 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         for (bound, origin) in scene.into_iter().zip(ray.origin) {
             extent = extent.max(bound + origin.abs());
         }
-        let per_axis = core::array::from_fn::<_, 3, _>(|axis| {
+        let axis = |axis: usize| -> [f32; 3] {
             let r = ray.reciprocal[axis];
             if extent < MAX_EXTENT {
                 let error = K_BOX * UNIT_ROUNDOFF * extent * r.abs();
                 let at_origin = -(ray.origin[axis] * r);
-                (r, at_origin - error, at_origin + error)
+                [r, at_origin - error, at_origin + error]
             } else {
-                (pow2(-126).copysign(r), -f32::MAX, f32::MAX)
+                [pow2(-126).copysign(r), -f32::MAX, f32::MAX]
             }
-        });
+        };
+        let (x, y, z) = (axis(0), axis(1), axis(2));
+        let [r, near, far] = [0, 1, 2].map(|i| [x[i], y[i], z[i]]);
         Self {
-            reciprocal: per_axis.map(|(r, _, _)| V::splat(token, r)),
-            near: per_axis.map(|(_, near, _)| V::splat(token, near)),
-            far: per_axis.map(|(_, _, far)| V::splat(token, far)),
+            reciprocal: splat3(token, r),
+            near: splat3(token, near),
+            far: splat3(token, far),
             t_min: V::splat(token, ray.t_min),
             negative: ray.reciprocal.map(|r| r.is_sign_negative() as usize),
         }
@@ -118,18 +120,22 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
     /// Which of the boxes the ray may meet up to `t_max`, a bit each, and from which `t` on.
     #[inline(always)]
     pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (u32, V) {
-        let [(near_x, far_x), (near_y, far_y), (near_z, far_z)] = [0, 1, 2].map(|axis| {
-            let first = self.negative[axis] & 1;
-            let plane = |side: usize| V::load(token, &planes[axis][side]);
-            let r = self.reciprocal[axis];
-            (
-                plane(first).mul_add(r, self.near[axis]),
-                plane(first ^ 1).mul_add(r, self.far[axis]),
-            )
-        });
+        let (near_x, far_x) = self.axis(token, planes, 0);
+        let (near_y, far_y) = self.axis(token, planes, 1);
+        let (near_z, far_z) = self.axis(token, planes, 2);
         let near = near_x.max(near_y).max(near_z.max(self.t_min));
         let far = far_x.min(far_y).min(far_z.min(t_max));
         (near.le(far).bits(), near)
+    }
+
+    /// From where to where the ray is between the two planes of an axis.
+    #[inline(always)]
+    fn axis(&self, token: V::Token, planes: &Planes<N>, axis: usize) -> (V, V) {
+        let first = self.negative[axis] & 1;
+        let r = self.reciprocal[axis];
+        let near = V::load(token, &planes[axis][first]).mul_add(r, self.near[axis]);
+        let far = V::load(token, &planes[axis][first ^ 1]).mul_add(r, self.far[axis]);
+        (near, far)
     }
 }
 

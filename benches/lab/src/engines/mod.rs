@@ -1,0 +1,81 @@
+//! The kernels that race, each behind the same two traits; a file each.
+//!
+//! What an engine may do untimed: build itself, and turn rays into its own format. Every engine is
+//! built by one thread, of the same buffers, and timed from those buffers to the first ray.
+
+mod bvh;
+mod embree;
+mod obvhs;
+mod wide_bvh;
+
+use ::wide_bvh::geometry::{Hit, Ray, TriangleMesh};
+use std::{
+    error::Error,
+    time::{Duration, Instant},
+};
+
+/// A kernel over one scene.
+pub trait Engine {
+    /// Its name in tables and JSON.
+    fn name(&self) -> &str;
+
+    /// How it was built.
+    fn built(&self) -> Built;
+
+    /// Whether it promises the reference's answers bit for bit. Others may round differently.
+    fn is_exact(&self) -> bool {
+        false
+    }
+
+    /// Turns rays into its own format.
+    fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a>;
+}
+
+/// Rays in an engine's own format. A call traces them all, one after another.
+pub trait Batch {
+    /// The first hit of each ray. `u` and `v` are zero where the engine does not tell them.
+    ///
+    /// `hits` is as long as the rays are.
+    fn closest(&self, hits: &mut [Option<Hit>]);
+
+    /// Whether anything is in each ray's way.
+    ///
+    /// `occluded` is as long as the rays are.
+    fn any(&self, occluded: &mut [bool]);
+}
+
+/// What building an engine cost.
+#[derive(Clone, Copy)]
+pub struct Built {
+    /// From the mesh's buffers to the first ray.
+    pub time: Duration,
+    /// What it keeps besides the mesh's buffers.
+    pub bytes: usize,
+}
+
+/// Every engine there is, over `mesh`; this crate's come first.
+///
+/// # Errors
+/// An engine cannot be built.
+pub fn all(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
+    let mut engines = wide_bvh::engines(mesh)?;
+    engines.extend(embree::engines(mesh)?);
+    engines.extend(obvhs::engines(mesh));
+    engines.push(bvh::engine(mesh));
+    Ok(engines)
+}
+
+/// A line on Embree: its version, or how to get it.
+///
+/// # Errors
+/// It is there, and does not work.
+pub fn about_embree() -> Result<String, Box<dyn Error>> {
+    Ok(embree::about()?)
+}
+
+/// What `build` makes, and how long it took.
+fn timed<T>(build: impl FnOnce() -> T) -> (T, Duration) {
+    let start = Instant::now();
+    let made = build();
+    (made, start.elapsed())
+}

@@ -1,0 +1,198 @@
+//! From a caller's binary tree to one as the builder makes them: see `Collapse::new`.
+
+use super::{
+    BuildError,
+    binary::{BinaryNode, BinaryTree},
+    binned,
+    input::Input,
+    refs::{Bounds, Ref, Refs},
+};
+use crate::geometry::{Aabb, TriangleMesh};
+use bytemuck::Zeroable;
+use std::{vec, vec::Vec};
+
+/// `tree` without the primitives that are not in `refs`, its leaves split down to single primitives, its boxes made of theirs.
+///
+/// # Errors
+/// The first place that lists a primitive that is not there; the first primitive that is in no leaf; more
+/// places than a tree may have.
+pub(super) fn adopt<I: Input>(
+    input: &I,
+    tree: &BinaryTree,
+    refs: &Refs,
+) -> Result<BinaryTree, BuildError> {
+    check(input, tree)?;
+    let places = Places::new(input.len(), &refs.refs);
+    let counts = counts(tree, &places);
+    let total = counts.first().copied().unwrap_or(0);
+    if total > TriangleMesh::MAX_TRIANGLES {
+        return Err(BuildError::TooManyPrimitives(total));
+    }
+    if total == 0 {
+        return Ok(BinaryTree::default());
+    }
+
+    let mut nodes = vec![BinaryNode::zeroed(); 2 * total - 1];
+    let mut order = Vec::with_capacity(total);
+    let mut kept = Vec::new();
+    // A node of `tree`, where it goes, and where those below it go.
+    let mut todo = vec![(0, 0, 1)];
+    while let Some((mut index, slot, at)) = todo.pop() {
+        // Past nodes of which one side is left.
+        let node = loop {
+            let node = &tree.nodes()[index];
+            if node.is_leaf() {
+                break node;
+            }
+            let [left, right] = node.children();
+            index = match (counts[left], counts[right]) {
+                (0, _) => right,
+                (_, 0) => left,
+                _ => break node,
+            };
+        };
+        if !node.is_leaf() {
+            let [left, right] = node.children();
+            nodes[slot] = inner(at);
+            let left_at = at + 2;
+            let right_at = left_at + 2 * counts[left] - 2;
+            todo.extend([(right, at + 1, right_at), (left, at, left_at)]);
+            continue;
+        }
+        kept.clear();
+        kept.extend(listed(tree, node).filter_map(|&id| places.of(&refs.refs, id)));
+        let centers = kept
+            .iter()
+            .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()));
+        let (above, below) = nodes.split_at_mut(at);
+        let below = &mut below[..2 * kept.len() - 2];
+        let first = order.len() as u32;
+        binned::subtree(
+            input,
+            &mut kept,
+            centers,
+            first,
+            &mut above[slot],
+            below,
+            at as u32,
+            0,
+        );
+        order.extend(kept.iter().map(Ref::id));
+    }
+    refit(&mut nodes);
+    Ok(BinaryTree::new_unchecked(nodes, order))
+}
+
+/// A node whose children are at `at`, its box not yet known.
+pub(super) fn inner(at: usize) -> BinaryNode {
+    BinaryNode {
+        aabb: Aabb::EMPTY,
+        first: at as u32,
+        count: 0,
+    }
+}
+
+/// Makes boxes anew from the leaves'. Every node comes before those below it.
+pub(super) fn refit(nodes: &mut [BinaryNode]) {
+    for index in (0..nodes.len()).rev() {
+        if !nodes[index].is_leaf() {
+            let [left, right] = nodes[index].children();
+            nodes[index].aabb = nodes[left].aabb.join(nodes[right].aabb);
+        }
+    }
+}
+
+/// The primitives of a leaf.
+fn listed<'a>(tree: &'a BinaryTree, leaf: &BinaryNode) -> core::slice::Iter<'a, u32> {
+    let first = leaf.first as usize;
+    tree.order()[first..first + leaf.count as usize].iter()
+}
+
+/// Every primitive is listed in a leaf, and no other.
+fn check<I: Input>(input: &I, tree: &BinaryTree) -> Result<(), BuildError> {
+    let primitives = input.len();
+    let mut is_listed = vec![false; primitives];
+    let mut offender: Option<usize> = None;
+    for leaf in tree.nodes().iter().filter(|node| node.is_leaf()) {
+        for (&primitive, place) in listed(tree, leaf).zip(leaf.first as usize..) {
+            match is_listed.get_mut(primitive as usize) {
+                Some(is_listed) => *is_listed = true,
+                None => offender = Some(offender.map_or(place, |first| first.min(place))),
+            }
+        }
+    }
+    if let Some(place) = offender {
+        return Err(BuildError::PrimitiveOutOfRange {
+            place,
+            primitive: tree.order()[place],
+            primitives,
+        });
+    }
+    match is_listed.iter().position(|is_listed| !is_listed) {
+        Some(primitive) => Err(BuildError::PrimitiveMissing { primitive }),
+        None => Ok(()),
+    }
+}
+
+/// Where each primitive's reference is.
+struct Places {
+    /// By number. Nothing, if it is the number's own.
+    places: Option<Vec<u32>>,
+}
+
+impl Places {
+    const LEFT_OUT: u32 = u32::MAX;
+
+    fn new(primitives: usize, refs: &[Ref]) -> Self {
+        if refs.len() == primitives {
+            return Self { places: None };
+        }
+        let mut places = vec![Self::LEFT_OUT; primitives];
+        for (r, place) in refs.iter().zip(0..) {
+            places[r.id() as usize] = place;
+        }
+        Self {
+            places: Some(places),
+        }
+    }
+
+    fn of(&self, refs: &[Ref], id: u32) -> Option<Ref> {
+        let place = self
+            .places
+            .as_ref()
+            .map_or(id, |places| places[id as usize]);
+        refs.get(place as usize).copied()
+    }
+
+    fn is_kept(&self, id: u32) -> bool {
+        self.places
+            .as_ref()
+            .is_none_or(|places| places[id as usize] != Self::LEFT_OUT)
+    }
+}
+
+/// How many primitives that are kept each node has below it.
+fn counts(tree: &BinaryTree, places: &Places) -> Vec<usize> {
+    let nodes = tree.nodes();
+    let mut counts = vec![0; nodes.len()];
+    // Each node before those below it.
+    let mut walk = Vec::with_capacity(nodes.len());
+    walk.extend((!nodes.is_empty()).then_some(0));
+    let mut next = 0;
+    while let Some(&index) = walk.get(next) {
+        next += 1;
+        if !nodes[index].is_leaf() {
+            walk.extend(nodes[index].children());
+        }
+    }
+    for &index in walk.iter().rev() {
+        let node = &nodes[index];
+        counts[index] = if node.is_leaf() {
+            listed(tree, node).filter(|&&id| places.is_kept(id)).count()
+        } else {
+            let [left, right] = node.children();
+            counts[left] + counts[right]
+        };
+    }
+    counts
+}

@@ -1,0 +1,201 @@
+//! What a caller builds with.
+
+use super::{
+    BinaryTree, BuildError, adopt, binned,
+    collapse::Collapse,
+    emit::{self, Parts},
+    input::{Boxes, Input, Triangles},
+    rebalance,
+    refs::Refs,
+};
+use crate::{
+    geometry::{Aabb, TriangleMesh},
+    layout::{Bvh, Bvh8, LayoutError, Owned, PrimitiveLeaf, STACK, TriangleLeaf, WideNode},
+};
+
+/// Builds hierarchies: a binary tree by the surface area heuristic, collapsed to wide nodes at the least
+/// cost.
+///
+/// The same input gives the same bits, on however many threads (feature `rayon`).
+///
+/// ```
+/// use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}};
+///
+/// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0f32]];
+/// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+/// let bvh = Builder::new().build(&mesh)?;
+/// assert!(bvh.closest_hit(&Ray::new([0.2, 0.2, -1.0], [0.0, 0.0, 1.0])).is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Builder {
+    drop_non_finite: bool,
+}
+
+impl Builder {
+    /// A builder that refuses primitives that are not finite.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Whether triangles with a corner that is NaN or infinite, and boxes with such a bound, are left out,
+    /// and counted, instead of being an error.
+    pub fn drop_non_finite(mut self, drop_non_finite: bool) -> Self {
+        self.drop_non_finite = drop_non_finite;
+        self
+    }
+
+    /// The hierarchy over a mesh, 8 wide.
+    ///
+    /// Triangles of which two corners are at one place are left out: no ray hits them.
+    ///
+    /// # Errors
+    /// The first position that is not finite, of those that triangles use.
+    pub fn build(&self, mesh: &TriangleMesh) -> Result<Bvh8, BuildError> {
+        self.build_as(mesh)
+    }
+
+    /// The hierarchy over a mesh, of nodes `N`. See [`build`](Self::build).
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_as<N: WideNode>(
+        &self,
+        mesh: &TriangleMesh,
+    ) -> Result<Bvh<N, TriangleLeaf, Owned>, BuildError> {
+        self.wide_over(&Triangles(mesh))
+    }
+
+    /// The hierarchy over a caller's primitives, which are numbered as their boxes are.
+    ///
+    /// A box that is [`Aabb::EMPTY`] stands for a primitive that is never hit.
+    ///
+    /// # Errors
+    /// The first box that is not finite or has `min` above `max`; too many of them.
+    pub fn build_primitives<N: WideNode>(
+        &self,
+        aabbs: &[Aabb],
+    ) -> Result<Bvh<N, PrimitiveLeaf, Owned>, BuildError> {
+        self.wide_over(&Boxes(aabbs))
+    }
+
+    /// The binary tree over a mesh, before it is collapsed: one triangle a leaf.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_binary(&self, mesh: &TriangleMesh) -> Result<BinaryTree, BuildError> {
+        self.binary(&Triangles(mesh)).map(|(tree, _)| tree)
+    }
+
+    /// The binary tree over a caller's primitives, before it is collapsed: one a leaf.
+    ///
+    /// # Errors
+    /// As [`build_primitives`](Self::build_primitives).
+    pub fn build_primitives_binary(&self, aabbs: &[Aabb]) -> Result<BinaryTree, BuildError> {
+        self.binary(&Boxes(aabbs)).map(|(tree, _)| tree)
+    }
+
+    /// The hierarchy over a mesh from a binary tree over its triangles, 8 wide.
+    ///
+    /// The tree's boxes are worked out anew. Which leaves and wide nodes come of it is the builder's choice;
+    /// leaves of several triangles are split where that is cheaper.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build); the first place of the tree's order with a triangle that is not in the mesh, or the
+    /// first triangle that is in no leaf.
+    pub fn build_from_tree(
+        &self,
+        mesh: &TriangleMesh,
+        tree: &BinaryTree,
+    ) -> Result<Bvh8, BuildError> {
+        self.build_from_tree_as(mesh, tree)
+    }
+
+    /// The hierarchy over a mesh from a binary tree, of nodes `N`. See
+    /// [`build_from_tree`](Self::build_from_tree).
+    ///
+    /// # Errors
+    /// As [`build_from_tree`](Self::build_from_tree).
+    pub fn build_from_tree_as<N: WideNode>(
+        &self,
+        mesh: &TriangleMesh,
+        tree: &BinaryTree,
+    ) -> Result<Bvh<N, TriangleLeaf, Owned>, BuildError> {
+        self.wide_from(&Triangles(mesh), tree)
+    }
+
+    /// The hierarchy over a caller's primitives from a binary tree over them. See
+    /// [`build_from_tree`](Self::build_from_tree).
+    ///
+    /// # Errors
+    /// As [`build_primitives`](Self::build_primitives) and [`build_from_tree`](Self::build_from_tree).
+    pub fn build_primitives_from_tree<N: WideNode>(
+        &self,
+        aabbs: &[Aabb],
+        tree: &BinaryTree,
+    ) -> Result<Bvh<N, PrimitiveLeaf, Owned>, BuildError> {
+        self.wide_from(&Boxes(aabbs), tree)
+    }
+
+    fn wide_over<N: WideNode, I: Input>(
+        &self,
+        input: &I,
+    ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
+        let (tree, dropped) = self.binary(input)?;
+        collapse(input, tree, dropped)
+    }
+
+    fn wide_from<N: WideNode, I: Input>(
+        &self,
+        input: &I,
+        tree: &BinaryTree,
+    ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
+        let refs = Refs::gather(input, self.drop_non_finite)?;
+        let tree = adopt::adopt(input, tree, &refs)?;
+        collapse(input, tree, refs.dropped)
+    }
+
+    /// The binary tree, and how many primitives were left out of it for not being finite.
+    fn binary<I: Input>(&self, input: &I) -> Result<(BinaryTree, usize), BuildError> {
+        let refs = Refs::gather(input, self.drop_non_finite)?;
+        let dropped = refs.dropped;
+        Ok((binned::build(input, refs), dropped))
+    }
+}
+
+/// The hierarchy from a tree as the builder makes them.
+fn collapse<N: WideNode, I: Input>(
+    input: &I,
+    tree: BinaryTree,
+    dropped: usize,
+) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
+    let Parts {
+        nodes,
+        leaves,
+        primitives,
+        bounds,
+    } = match N::WIDTH {
+        4 => collapse_to::<N, I, 4>(input, tree),
+        _ => collapse_to::<N, I, 8>(input, tree),
+    }?;
+    let bvh = Bvh::from_parts(nodes, leaves, primitives, bounds)?;
+    Ok(bvh.with_dropped(dropped as u32))
+}
+
+fn collapse_to<N: WideNode, I: Input, const W: usize>(
+    input: &I,
+    tree: BinaryTree,
+) -> Result<Parts<N, I::Leaf>, LayoutError> {
+    let collapsed = Collapse::<W>::new(input, &tree);
+    let parts = emit::emit(input, &tree, &collapsed);
+    let Err(LayoutError::TooDeep(_)) = parts else {
+        return parts;
+    };
+    // A wide node takes up a binary level at least and leaves W - 1 children behind at most. So a tree
+    // of no more levels than this fits the stack, however it is collapsed; and it has room for halving
+    // 2^30 primitives, whatever the width.
+    const { assert!((STACK - 1) / (W - 1) >= 30) };
+    let levels = ((STACK - 1) / (W - 1)) as u32;
+    let tree = rebalance::rebalance(input, &tree, levels);
+    emit::emit(input, &tree, &Collapse::<W>::new(input, &tree))
+}

@@ -1,0 +1,246 @@
+//! Which subtrees become leaves, and which nodes of the binary tree become the children of a wide one:
+//! the cheapest of all ways, by dynamic programming.
+//!
+//! Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017), section
+//! 3.1. C(n, i) is the least cost of what is below node n as at most i separate roots:
+//!
+//! - C(n, 1) is that of a leaf, if all fits into one, or of a wide node over C(n, W);
+//! - C(n, i) is C(n, i - 1), or the least of C(left, k) + C(right, i - k).
+
+use super::{
+    binary::{BinaryNode, BinaryTree},
+    cost::{self, Measure},
+    input::Input,
+};
+use core::ops::Range;
+use std::{vec, vec::Vec};
+
+/// The widest node there is.
+pub(super) const MAX_WIDTH: usize = 8;
+
+/// Subtrees of up to so many nodes are one task.
+const TASK_NODES: usize = 1 << 14;
+
+/// What is known of a binary node.
+#[derive(Clone, Copy)]
+struct Entry {
+    /// C(n, 1) to C(n, 7).
+    forest: [f32; MAX_WIDTH - 1],
+    /// Where its primitives begin in the tree's order.
+    first: u32,
+    /// How many primitives it has, or 255 if more.
+    count: u8,
+    /// Whether they fit into a leaf.
+    fits: bool,
+    /// Whether C(n, 1) is a leaf's.
+    is_leaf: bool,
+}
+
+impl Entry {
+    const NONE: Self = Self {
+        forest: [0.0; _],
+        first: 0,
+        count: 0,
+        fits: false,
+        is_leaf: false,
+    };
+}
+
+/// The cheapest collapse of a tree to nodes `W` wide.
+pub(super) struct Collapse<'a, const W: usize> {
+    tree: &'a BinaryTree,
+    entries: Vec<Entry>,
+}
+
+impl<'a, const W: usize> Collapse<'a, W> {
+    /// Of a tree as the builder makes them: one primitive a leaf; the nodes below a node are a range of
+    /// their own, which begins with its children and goes on with those below the left one.
+    pub fn new<I: Input>(input: &I, tree: &'a BinaryTree) -> Self {
+        const { assert!(W >= 2 && W <= MAX_WIDTH) };
+        let nodes = tree.nodes();
+        let mut entries = vec![Entry::NONE; nodes.len()];
+        if let Some(root) = nodes.first() {
+            let solver = Solver::<W, I> {
+                input,
+                tree,
+                measure: Measure::of_bounds(&root.aabb),
+            };
+            solver.solve_all(&mut entries);
+        }
+        Self { tree, entries }
+    }
+
+    /// The primitives of a node that is to be a leaf, as a range of the tree's order.
+    pub fn leaf(&self, node: usize) -> Option<Range<usize>> {
+        let entry = &self.entries[node];
+        let first = entry.first as usize;
+        entry.is_leaf.then(|| first..first + entry.count as usize)
+    }
+
+    /// The children of a wide node: the places of binary ones, in the binary tree's order, and how many.
+    pub fn children(&self, node: usize) -> ([usize; W], usize) {
+        let (mut children, mut count) = ([0; W], 0);
+        // Forests still to be taken apart, and how many roots each may have: never more than W in all.
+        let mut todo = [(0, 0); W];
+        let mut len = self.cut(node, W, &mut todo);
+        while len > 0 {
+            len -= 1;
+            let (node, mut roots) = todo[len];
+            // As few roots as do for the cost.
+            let forest = &self.entries[node].forest;
+            while roots > 1 && forest[roots - 2] <= forest[roots - 1] {
+                roots -= 1;
+            }
+            if roots == 1 {
+                children[count] = node;
+                count += 1;
+            } else {
+                len += self.cut(node, roots, &mut todo[len..]);
+            }
+        }
+        (children, count)
+    }
+
+    /// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
+    fn cut(&self, node: usize, roots: usize, out: &mut [(usize, usize)]) -> usize {
+        let [left, right] = self.tree.nodes()[node].children();
+        let cost =
+            |k: usize| self.entries[left].forest[k - 1] + self.entries[right].forest[roots - k - 1];
+        let mut best = 1;
+        for k in 2..roots {
+            if cost(k) < cost(best) {
+                best = k;
+            }
+        }
+        out[0] = (right, roots - best);
+        out[1] = (left, best);
+        2
+    }
+}
+
+struct Solver<'a, const W: usize, I> {
+    input: &'a I,
+    tree: &'a BinaryTree,
+    measure: Measure,
+}
+
+impl<const W: usize, I: Input> Solver<'_, W, I> {
+    /// Every node after those below it, without recursion: ranges of small subtrees first, at once, then what is above.
+    fn solve_all(&self, entries: &mut [Entry]) {
+        let tasks = self.tasks();
+        let mut slices = Vec::with_capacity(tasks.len());
+        let (mut rest, mut passed) = (&mut *entries, 0);
+        for task in &tasks {
+            let (slice, after) = rest[task.start - passed..].split_at_mut(task.len());
+            slices.push((task.start, slice));
+            (rest, passed) = (after, task.end);
+        }
+        let solve = |(start, slice): (usize, &mut [Entry])| {
+            for node in (0..slice.len()).rev() {
+                slice[node] = self.solve(start + node, slice, start);
+            }
+        };
+        #[cfg(feature = "rayon")]
+        {
+            use rayon::prelude::*;
+            slices.into_par_iter().for_each(solve);
+        }
+        #[cfg(not(feature = "rayon"))]
+        slices.into_iter().for_each(solve);
+
+        let mut tasks = tasks;
+        let mut node = entries.len();
+        while node > 0 {
+            if let Some(task) = tasks.pop_if(|task| task.end == node) {
+                node = task.start;
+                continue;
+            }
+            node -= 1;
+            entries[node] = self.solve(node, entries, 0);
+        }
+    }
+
+    /// What is below the largest subtrees of up to [`TASK_NODES`] nodes: ranges, in order.
+    fn tasks(&self) -> Vec<Range<usize>> {
+        let nodes = self.tree.nodes();
+        let mut tasks = Vec::new();
+        // A node, and where the range of the nodes below it ends.
+        let mut todo = vec![(0, nodes.len())];
+        while let Some((node, end)) = todo.pop() {
+            if nodes[node].is_leaf() {
+                continue;
+            }
+            let [left, right] = nodes[node].children();
+            if end - left <= TASK_NODES {
+                tasks.push(left..end);
+                continue;
+            }
+            let right_node = &nodes[right];
+            let middle = match right_node.is_leaf() {
+                true => end,
+                false => right_node.first as usize,
+            };
+            todo.extend([(right, end), (left, middle)]);
+        }
+        tasks
+    }
+
+    /// One node; those below it are in `entries`, of which the first is that of node `start`.
+    #[inline(always)]
+    fn solve(&self, node: usize, entries: &[Entry], start: usize) -> Entry {
+        let BinaryNode { aabb, first, .. } = self.tree.nodes()[node];
+        let area = self.measure.half_area(&aabb);
+        if self.tree.nodes()[node].is_leaf() {
+            return Entry {
+                forest: [area * I::leaf_cost(1); _],
+                first,
+                count: 1,
+                fits: true,
+                is_leaf: true,
+            };
+        }
+
+        let [left, right] = self.tree.nodes()[node].children();
+        let (left, right) = (&entries[left - start], &entries[right - start]);
+        // `forest[i - 1]` is C(n, i), of i > 1 roots exactly.
+        let mut forest = [f32::INFINITY; MAX_WIDTH];
+        for k in 1..W {
+            for i in k + 1..=W {
+                let cost = left.forest[k - 1] + right.forest[i - k - 1];
+                if cost < forest[i - 1] {
+                    forest[i - 1] = cost;
+                }
+            }
+        }
+        forest[0] = forest[W - 1] + area * cost::NODE;
+
+        let first = left.first;
+        let count = left.count.saturating_add(right.count);
+        let mut fits = left.fits && right.fits && count as usize <= I::MAX_LEAF;
+        if fits {
+            let first = first as usize;
+            fits = self
+                .input
+                .fits(&self.tree.order()[first..first + count as usize]);
+        }
+        let mut is_leaf = false;
+        if fits {
+            let leaf = area * I::leaf_cost(count as usize);
+            is_leaf = leaf <= forest[0];
+            if is_leaf {
+                forest[0] = leaf;
+            }
+        }
+        for i in 1..W {
+            forest[i] = forest[i].min(forest[i - 1]);
+        }
+        let [forest @ .., _] = forest;
+        Entry {
+            forest,
+            first,
+            count,
+            fits,
+            is_leaf,
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Why a hierarchy could not be built.
+
+use crate::layout::LayoutError;
+use core::{error::Error, fmt};
+use glam::Vec3;
+
+/// Why a hierarchy could not be built; names the first offender.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// A corner of a triangle is NaN or infinite.
+    NonFinitePosition {
+        /// The triangle.
+        triangle: usize,
+        /// Which of its corners, 0 to 2.
+        corner: usize,
+        /// The corner's place in the mesh's positions.
+        vertex: u32,
+        /// Where it is.
+        position: Vec3,
+    },
+    /// A bound of a primitive's box is NaN or infinite.
+    NonFiniteBox {
+        /// The primitive.
+        primitive: usize,
+    },
+    /// A primitive's box has its `min` above its `max` on some axis.
+    InvalidBox {
+        /// The primitive.
+        primitive: usize,
+    },
+    /// There are this many primitives, which is more than
+    /// [`TriangleMesh::MAX_TRIANGLES`](crate::geometry::TriangleMesh::MAX_TRIANGLES), or a tree that
+    /// lists them this often.
+    TooManyPrimitives(usize),
+    /// No leaf of the tree lists this primitive.
+    PrimitiveMissing {
+        /// The primitive.
+        primitive: usize,
+    },
+    /// The tree lists a primitive that is not there.
+    PrimitiveOutOfRange {
+        /// Where in the tree's order.
+        place: usize,
+        /// The primitive listed there.
+        primitive: u32,
+        /// How many primitives there are.
+        primitives: usize,
+    },
+    /// The parts did not pass the layout's check. A bug in the builder, should it ever be seen.
+    Layout(LayoutError),
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NonFinitePosition {
+                triangle,
+                corner,
+                vertex,
+                position: Vec3 { x, y, z },
+            } => write!(
+                f,
+                "triangle {triangle}, corner {corner}: vertex {vertex} is at ({x}, {y}, {z})"
+            ),
+            Self::NonFiniteBox { primitive } => {
+                write!(f, "primitive {primitive}: its box is NaN or infinite")
+            }
+            Self::InvalidBox { primitive } => {
+                write!(f, "primitive {primitive}: its box has min above max")
+            }
+            Self::TooManyPrimitives(count) => write!(f, "{count} primitives are too many"),
+            Self::PrimitiveMissing { primitive } => {
+                write!(f, "primitive {primitive} is in no leaf of the tree")
+            }
+            Self::PrimitiveOutOfRange {
+                place,
+                primitive,
+                primitives,
+            } => write!(
+                f,
+                "place {place} of the tree's order: primitive {primitive} is past the {primitives} there are"
+            ),
+            Self::Layout(error) => write!(f, "the hierarchy built is not sound: {error}"),
+        }
+    }
+}
+
+impl Error for BuildError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Layout(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<LayoutError> for BuildError {
+    fn from(error: LayoutError) -> Self {
+        Self::Layout(error)
+    }
+}

@@ -1,0 +1,149 @@
+//! A few references, split down to single ones: every cut on every axis is weighed.
+//!
+//! The references are sorted once an axis; a cut keeps the other axes' orders.
+
+use super::{
+    binary::BinaryNode,
+    input::Input,
+    refs::{Bounds, Ref},
+};
+
+/// The most references that are swept. Above it bins are faster and lose next to nothing.
+pub(super) const MAX: usize = 64;
+
+/// References by place, and their order along each axis.
+struct Sweep<'a, I> {
+    input: &'a I,
+    refs: [Ref; MAX],
+    orders: [[u8; MAX]; 3],
+    /// The place of `refs[0]` in the tree's order.
+    first: u32,
+}
+
+/// Builds the tree over `refs`, at most [`MAX`] of them, and leaves them in its order: `root`, and the
+/// nodes below it into `below`, whose own place is `at`.
+pub(super) fn build<I: Input>(
+    input: &I,
+    refs: &mut [Ref],
+    first: u32,
+    root: &mut BinaryNode,
+    below: &mut [BinaryNode],
+    at: u32,
+) {
+    let len = refs.len();
+    let mut sweep = Sweep {
+        input,
+        refs: [Ref::NONE; MAX],
+        orders: [[0; MAX]; 3],
+        first,
+    };
+    sweep.refs[..len].copy_from_slice(refs);
+    let mut keys = [0; MAX];
+    for axis in 0..3 {
+        for (place, r) in refs.iter().enumerate() {
+            let center = r.center2().to_array()[axis];
+            keys[place] = (u64::from(sortable(center)) << 32) | place as u64;
+        }
+        keys[..len].sort_unstable();
+        for (order, key) in sweep.orders[axis].iter_mut().zip(&keys[..len]) {
+            *order = *key as u8;
+        }
+    }
+    sweep.split(0, len, root, below, at);
+    for (r, &place) in refs.iter_mut().zip(&sweep.orders[0]) {
+        *r = sweep.refs[place as usize];
+    }
+}
+
+/// Bits that are in order as the floats are.
+fn sortable(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 0 {
+        bits | 1 << 31
+    } else {
+        !bits
+    }
+}
+
+impl<I: Input> Sweep<'_, I> {
+    fn split(
+        &mut self,
+        start: usize,
+        end: usize,
+        root: &mut BinaryNode,
+        below: &mut [BinaryNode],
+        at: u32,
+    ) {
+        let [left, right, below @ ..] = below else {
+            let id = self.refs[self.orders[0][start] as usize].id();
+            *root = BinaryNode {
+                aabb: self.input.aabb(id),
+                first: self.first + start as u32,
+                count: 1,
+            };
+            return;
+        };
+        let (axis, mid) = self.cheapest(start, end);
+        self.partition(axis, start, mid, end);
+        let (left_below, right_below) = below.split_at_mut(2 * (mid - start) - 2);
+        let left_at = at + 2;
+        let right_at = left_at + left_below.len() as u32;
+        self.split(start, mid, left, left_below, left_at);
+        self.split(mid, end, right, right_below, right_at);
+        *root = BinaryNode {
+            aabb: left.aabb.join(right.aabb),
+            first: at,
+            count: 0,
+        };
+    }
+
+    /// The axis and the place of the cheapest cut; of equals the one nearest to halves.
+    fn cheapest(&self, start: usize, end: usize) -> (usize, usize) {
+        let mut best = (f32::INFINITY, usize::MAX);
+        let mut cut = (0, (start + end) / 2);
+        let mut right_costs = [0.0; MAX];
+        for axis in 0..3 {
+            let order = &self.orders[axis][start..end];
+            let len = order.len();
+            let mut bounds = Bounds::EMPTY;
+            for place in (1..len).rev() {
+                bounds = bounds.join(self.refs[order[place] as usize].bounds());
+                right_costs[place] = bounds.half_area() * (len - place) as f32;
+            }
+            let mut bounds = Bounds::EMPTY;
+            for place in 1..len {
+                bounds = bounds.join(self.refs[order[place - 1] as usize].bounds());
+                let cost = bounds.half_area() * place as f32 + right_costs[place];
+                let key = (cost, place.abs_diff(len - place));
+                if key < best {
+                    best = key;
+                    cut = (axis, start + place);
+                }
+            }
+        }
+        cut
+    }
+
+    /// Has the other axes' orders agree on what is left of `mid`.
+    fn partition(&mut self, axis: usize, start: usize, mid: usize, end: usize) {
+        let mut is_left = [false; MAX];
+        for &place in &self.orders[axis][start..mid] {
+            is_left[place as usize] = true;
+        }
+        for other in [(axis + 1) % 3, (axis + 2) % 3] {
+            let order = &mut self.orders[other];
+            let mut rest = [0; MAX];
+            let (mut left, mut right) = (start, 0);
+            for place in start..end {
+                let r = order[place];
+                let go_left = is_left[r as usize];
+                // Both are written, one is kept: no branch to miss.
+                order[left] = r;
+                rest[right] = r;
+                left += usize::from(go_left);
+                right += usize::from(!go_left);
+            }
+            order[mid..end].copy_from_slice(&rest[..right]);
+        }
+    }
+}

@@ -1,0 +1,448 @@
+//! Whole builds, held to what every hierarchy must be.
+
+use super::{BinaryNode, BinaryTree, BuildError, Builder};
+use crate::{
+    geometry::{Aabb, Ray, TriangleMesh},
+    layout::{Bvh, Bvh8, ChildKind, Leaf, Node4, Node8, Owned, TriangleLeaf, WideNode},
+};
+use glam::Vec3;
+use std::{format, vec, vec::Vec};
+
+type Position = [f32; 3];
+
+/// Numbers that look random: a linear congruence (Knuth's MMIX), its upper bits.
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32
+    }
+
+    /// In 0 to 1.
+    fn unit(&mut self) -> f32 {
+        self.bits() as f32 / (1u32 << 31) as f32
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+/// Three corners a triangle, in order.
+fn soup(corners: &[Position]) -> Vec<[u32; 3]> {
+    (0..corners.len() as u32 / 3)
+        .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+        .collect()
+}
+
+/// Small triangles all over the unit cube.
+fn dust(count: usize, seed: u64) -> Vec<Position> {
+    let mut random = Random(seed);
+    let mut positions = Vec::new();
+    for _ in 0..count {
+        let p = random.point();
+        for _ in 0..3 {
+            positions.push((p + 0.02 * random.point()).to_array());
+        }
+    }
+    positions
+}
+
+/// A square of `side` times `side` quads, which share their vertices.
+fn grid(side: u32) -> (Vec<Position>, Vec<[u32; 3]>) {
+    let place = |x: u32, y: u32| y * (side + 1) + x;
+    let mut positions = Vec::new();
+    let mut indices = Vec::new();
+    for y in 0..=side {
+        for x in 0..=side {
+            let (x, y) = (x as f32, y as f32);
+            positions.push([x, y, (x * 0.7).sin() + (y * 0.4).cos()]);
+        }
+    }
+    for y in 0..side {
+        for x in 0..side {
+            let [a, b, c, d] = [
+                place(x, y),
+                place(x + 1, y),
+                place(x, y + 1),
+                place(x + 1, y + 1),
+            ];
+            indices.extend([[a, b, c], [b, d, c]]);
+        }
+    }
+    (positions, indices)
+}
+
+/// Every one of `expected` is in one leaf, and every box is the least around what is below it.
+fn check_bvh<N: WideNode, L: Leaf>(
+    bvh: &Bvh<N, L, Owned>,
+    expected: &[u32],
+    aabb: impl Fn(u32) -> Aabb,
+) {
+    let mut seen = bvh.primitives().to_vec();
+    seen.sort_unstable();
+    assert_eq!(seen, expected);
+
+    let leaf_aabb = |leaf: usize| {
+        let places = bvh.leaves()[leaf].primitives();
+        let ids = &bvh.primitives()[places.start as usize..places.end as usize];
+        assert!(ids.is_sorted());
+        ids.iter().fold(Aabb::EMPTY, |all, &id| all.join(aabb(id)))
+    };
+    let mut boxes = vec![Aabb::EMPTY; bvh.nodes().len()];
+    for (index, node) in bvh.nodes().iter().enumerate().rev() {
+        for (lane, child) in node.children().iter().enumerate() {
+            let below = match child.kind() {
+                ChildKind::Empty => continue,
+                ChildKind::Node(node) => boxes[node],
+                ChildKind::Leaf(leaf) => leaf_aabb(leaf),
+            };
+            assert_eq!(node.child_aabb(lane), below, "node {index}, lane {lane}");
+            boxes[index] = boxes[index].join(below);
+        }
+    }
+    let root = match bvh.root().kind() {
+        ChildKind::Empty => Aabb::EMPTY,
+        ChildKind::Node(node) => boxes[node],
+        ChildKind::Leaf(leaf) => leaf_aabb(leaf),
+    };
+    assert_eq!(*bvh.bounds(), root);
+}
+
+/// Both widths, and the way over a binary tree, of triangles that all are kept.
+fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
+    let mesh = TriangleMesh::new(positions, indices).unwrap();
+    let all: Vec<u32> = (0..indices.len() as u32).collect();
+    let aabb = |id: u32| Aabb::from_points(mesh.triangle(id as usize).unwrap());
+    let builder = Builder::new();
+    let bvh = builder.build(&mesh).unwrap();
+    check_bvh(&bvh, &all, aabb);
+    check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
+
+    let tree = builder.build_binary(&mesh).unwrap();
+    let (nodes, order) = tree.into_parts();
+    assert_eq!(nodes.len(), 2 * indices.len() - 1);
+    let tree = BinaryTree::new(nodes, order).unwrap();
+    assert_same(&bvh, &builder.build_from_tree(&mesh, &tree).unwrap());
+}
+
+fn assert_same(a: &Bvh8, b: &Bvh8) {
+    assert!(bytes_of(a) == bytes_of(b));
+}
+
+fn bytes_of(bvh: &Bvh8) -> (&[u8], &[u8], &[u32]) {
+    (
+        bytemuck::cast_slice(bvh.nodes()),
+        bytemuck::cast_slice(bvh.leaves()),
+        bvh.primitives(),
+    )
+}
+
+#[test]
+fn every_triangle_is_in_a_leaf() {
+    for count in [1, 2, 3, 8, 9, 33, 64, 65, 300, 5000] {
+        let positions = dust(count, 7);
+        check_mesh(&positions, &soup(&positions));
+    }
+    for side in [1, 2, 3, 10, 50] {
+        let (positions, indices) = grid(side);
+        check_mesh(&positions, &indices);
+    }
+}
+
+#[test]
+fn leaves_are_filled_where_vertices_are_shared() {
+    let (positions, indices) = grid(64);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let shared = Builder::new().build(&mesh).unwrap();
+    // A leaf of 8 vertices holds 6 triangles of a strip.
+    assert!(shared.leaves().len() * 3 < indices.len(), "{shared:?}");
+
+    // Vertices that are shared by place alone do as well.
+    let corners: Vec<Position> = indices
+        .iter()
+        .flatten()
+        .map(|&i| positions[i as usize])
+        .collect();
+    let indices = soup(&corners);
+    let mesh = TriangleMesh::new(&corners, &indices).unwrap();
+    assert_same(&shared, &Builder::new().build(&mesh).unwrap());
+}
+
+#[test]
+fn nothing_builds_and_misses() {
+    let mesh = TriangleMesh::new::<[f32; 3], [u32; 3]>(&[], &[]).unwrap();
+    let bvh = Builder::new().build(&mesh).unwrap();
+    assert_eq!(bvh.report().leaves, 0);
+    assert_eq!(bvh.closest_hit(&Ray::new([0.0; 3], [1.0, 0.0, 0.0])), None);
+    let tree = Builder::new().build_binary(&mesh).unwrap();
+    assert_eq!(tree, BinaryTree::default());
+    let bvh = Builder::new().build_from_tree(&mesh, &tree).unwrap();
+    assert_eq!(bvh.leaves().len(), 0);
+    let bvh = Builder::new().build_primitives::<Node4>(&[]).unwrap();
+    assert_eq!(bvh.report().primitives, 0);
+}
+
+#[test]
+fn the_first_offender_is_named() {
+    let mut positions = dust(100_000, 3);
+    let indices = soup(&positions);
+    positions[3 * 70_000] = [0.0, f32::NAN, 0.0];
+    positions[3 * 40_000 + 2] = [f32::INFINITY, 0.0, 1.0];
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let error = BuildError::NonFinitePosition {
+        triangle: 40_000,
+        corner: 2,
+        vertex: 120_002,
+        position: Vec3::new(f32::INFINITY, 0.0, 1.0),
+    };
+    assert_eq!(Builder::new().build(&mesh).unwrap_err(), error);
+    assert_eq!(
+        format!("{error}"),
+        "triangle 40000, corner 2: vertex 120002 is at (inf, 0, 1)"
+    );
+
+    let bvh = Builder::new().drop_non_finite(true).build(&mesh).unwrap();
+    assert_eq!(bvh.report().dropped, 2);
+    assert_eq!(bvh.report().primitives, indices.len() - 2);
+
+    let mut boxes = vec![Aabb::new(Vec3::ZERO, Vec3::ONE); 9];
+    boxes[3] = Aabb::EMPTY;
+    boxes[5].max.y = f32::NAN;
+    let build = |builder: Builder, boxes: &[Aabb]| builder.build_primitives::<Node8>(boxes);
+    let dropping = Builder::new().drop_non_finite(true);
+    let error = BuildError::NonFiniteBox { primitive: 5 };
+    assert_eq!(build(Builder::new(), &boxes).unwrap_err(), error);
+    assert_eq!(build(dropping, &boxes).unwrap().report().dropped, 1);
+    boxes[2].max.y = -1.0;
+    let error = BuildError::InvalidBox { primitive: 2 };
+    assert_eq!(build(Builder::new(), &boxes).unwrap_err(), error);
+    assert_eq!(build(dropping, &boxes).unwrap_err(), error);
+}
+
+#[test]
+fn triangles_without_area_are_left_out_or_harmless() {
+    let mut positions = dust(100, 5);
+    let indices = soup(&positions);
+    // Two corners at one place; all three in a line.
+    positions[30] = positions[31];
+    positions[93] = [-0.0, 0.0, 0.5];
+    positions[95] = [0.0, -0.0, 0.5];
+    positions[60] = [0.0; 3];
+    positions[61] = [0.25; 3];
+    positions[62] = [0.5; 3];
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let kept: Vec<u32> = (0..100).filter(|id| ![10, 31].contains(id)).collect();
+    let bvh = Builder::new().build(&mesh).unwrap();
+    check_bvh(&bvh, &kept, |id| {
+        Aabb::from_points(mesh.triangle(id as usize).unwrap())
+    });
+
+    // A tree that lists them is pruned: to nothing, if there is nothing else.
+    let tree = chain(100);
+    let bvh = Builder::new().build_from_tree(&mesh, &tree).unwrap();
+    check_bvh(&bvh, &kept, |id| {
+        Aabb::from_points(mesh.triangle(id as usize).unwrap())
+    });
+    let mesh = TriangleMesh::new(&[[0.0f32; 3]; 3], &[[0, 1, 2], [0u32, 0, 1]]).unwrap();
+    let bvh = Builder::new().build_from_tree(&mesh, &chain(2)).unwrap();
+    assert!(bvh.bounds().is_empty());
+}
+
+#[test]
+fn one_place_for_all() {
+    let triangle = [[1.0, 2.0, 3.0], [2.0, 2.0, 3.0], [1.0, 3.0, 3.5]];
+    let positions = triangle.repeat(20_000);
+    check_mesh(&positions, &soup(&positions));
+    check_mesh(&triangle, &[[0, 1, 2]].repeat(20_000));
+}
+
+#[test]
+fn one_giant_among_dust() {
+    let mut positions = dust(20_000, 11);
+    positions.extend([[-1e30, -1e30, 0.0], [1e30, -1e30, 0.3], [0.0, 1e30, 0.6]]);
+    check_mesh(&positions, &soup(&positions));
+}
+
+#[test]
+fn numbers_at_the_ends_of_their_range() {
+    for scale in [f32::MAX, 1e30, 1e-30, 1e-38, 1e-44] {
+        let positions: Vec<Position> = dust(3000, 13)
+            .iter()
+            .map(|p| p.map(|x| (1.9 * x - 0.95) * scale))
+            .collect();
+        let indices = soup(&positions);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let bvh = Builder::new().build(&mesh).unwrap();
+        check_bvh(&bvh, &bvh.sorted_primitives(), |id| {
+            Aabb::from_points(mesh.triangle(id as usize).unwrap())
+        });
+        assert!(bvh.report().sah_cost.is_finite());
+    }
+    // Both ends at once, and everything between.
+    let mut random = Random(17);
+    let positions: Vec<Position> = (0..9000)
+        .map(|_| [0; 3].map(|_| f32::from_bits(random.bits() << 1 & 0xbf7f_ffff)))
+        .collect();
+    let mesh_indices = soup(&positions);
+    check_mesh(&positions, &mesh_indices);
+    let positions: Vec<Position> = (0..9000)
+        .map(|i| [0, 1, 2].map(|axis| [f32::MAX, -f32::MAX, 1.0][(i + axis + i / 3) % 3]))
+        .collect();
+    check_mesh(&positions, &soup(&positions));
+}
+
+#[test]
+fn spacing_that_doubles() {
+    // Each cut of the heuristic takes off little.
+    let positions: Vec<Position> = (0..2000)
+        .flat_map(|i| {
+            let x = 2.0f32.powf(i as f32 / 2000.0 * 250.0 - 125.0);
+            [[x, 0.0, 0.0], [x, x, 0.0], [x, 0.0, x]]
+        })
+        .collect();
+    check_mesh(&positions, &soup(&positions));
+}
+
+fn node(first: u32, count: u32) -> BinaryNode {
+    BinaryNode {
+        aabb: Aabb::EMPTY,
+        first,
+        count,
+    }
+}
+
+/// A tree as deep as can be: every node has a leaf, now left, now right, and the rest.
+fn chain(leaves: u32) -> BinaryTree {
+    let mut nodes = vec![node(0, 1)];
+    let mut rest = 0;
+    for leaf in 0..leaves - 1 {
+        nodes[rest] = node(nodes.len() as u32, 0);
+        rest = nodes.len() + usize::from(leaf % 3 > 0);
+        nodes.extend([node(leaf, 1); 2]);
+        nodes[rest] = node(leaf + 1, 1);
+    }
+    BinaryTree::new(nodes, (0..leaves).collect()).unwrap()
+}
+
+#[test]
+fn a_chain_of_a_million_nodes() {
+    let boxes: Vec<Aabb> = (0..1_000_000u32)
+        .map(|i| {
+            let x = (i as f32).sqrt();
+            Aabb::new(Vec3::splat(x), Vec3::splat(x + 1.0))
+        })
+        .collect();
+    let tree = chain(boxes.len() as u32);
+    let all: Vec<u32> = (0..boxes.len() as u32).collect();
+    let aabb = |id: u32| boxes[id as usize];
+    let builder = Builder::new();
+    let bvh = builder.build_primitives_from_tree::<Node8>(&boxes, &tree);
+    check_bvh(&bvh.unwrap(), &all, aabb);
+    let bvh = builder.build_primitives_from_tree::<Node4>(&boxes, &tree);
+    check_bvh(&bvh.unwrap(), &all, aabb);
+}
+
+#[test]
+fn trees_of_others() {
+    let positions = dust(4, 19);
+    let indices = soup(&positions);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let build = |nodes: Vec<BinaryNode>, order: Vec<u32>| {
+        let tree = BinaryTree::new(nodes, order).unwrap();
+        Builder::new().build_from_tree(&mesh, &tree)
+    };
+    // Children before their parents, a leaf of several, one listed twice, a place that is nobody's.
+    let nodes = vec![node(3, 0), node(0, 3), node(4, 1), node(1, 0), node(5, 2)];
+    let bvh = build(nodes.clone(), vec![3, 1, 0, 9, 2, 1, 2]).unwrap();
+    check_bvh(&bvh, &[0, 1, 1, 2, 2, 3], |id| {
+        Aabb::from_points(mesh.triangle(id as usize).unwrap())
+    });
+    assert_eq!(
+        build(nodes.clone(), vec![3, 1, 1, 0, 2, 1, 2]).unwrap_err(),
+        BuildError::PrimitiveMissing { primitive: 0 }
+    );
+    assert_eq!(
+        build(nodes, vec![3, 1, 0, 0, 2, 1, 4]).unwrap_err(),
+        BuildError::PrimitiveOutOfRange {
+            place: 6,
+            primitive: 4,
+            primitives: 4
+        }
+    );
+    assert_eq!(
+        build(vec![], vec![]).unwrap_err(),
+        BuildError::PrimitiveMissing { primitive: 0 }
+    );
+}
+
+#[test]
+fn trees_of_any_shape_fit_the_stack() {
+    let mut random = Random(23);
+    for round in 0..60 {
+        let count = 1 + random.bits() % 3000;
+        let positions = dust(count as usize, round);
+        let indices = soup(&positions);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        // Split a node drawn at random, or, to get deep, one of the latest, until all leaves are single.
+        let mut nodes = vec![node(0, count)];
+        let mut open = vec![0usize];
+        while !open.is_empty() {
+            let recent = (round as usize % 3 + 1).min(open.len());
+            let pick = open.len() - 1 - random.bits() as usize % recent;
+            let index = open.swap_remove(pick);
+            let BinaryNode { first, count, .. } = nodes[index];
+            if count == 1 {
+                continue;
+            }
+            let left = match round % 4 {
+                0 => 1 + random.bits() % (count - 1),
+                1 => 1,
+                2 => count - 1,
+                _ => (count / 8).max(1),
+            };
+            nodes[index] = node(nodes.len() as u32, 0);
+            open.extend([nodes.len(), nodes.len() + 1]);
+            nodes.extend([node(first, left), node(first + left, count - left)]);
+        }
+        let tree = BinaryTree::new(nodes, (0..count).collect()).unwrap();
+        let all: Vec<u32> = (0..count).collect();
+        let aabb = |id: u32| Aabb::from_points(mesh.triangle(id as usize).unwrap());
+        let builder = Builder::new();
+        let bvh = builder.build_from_tree_as::<Node8>(&mesh, &tree).unwrap();
+        check_bvh(&bvh, &all, aabb);
+        let bvh = builder.build_from_tree_as::<Node4>(&mesh, &tree).unwrap();
+        check_bvh(&bvh, &all, aabb);
+    }
+}
+
+#[cfg(feature = "rayon")]
+#[test]
+fn the_same_on_any_number_of_threads() {
+    let positions = dust(150_000, 29);
+    let indices = soup(&positions);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let build = |threads: usize| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap()
+            .install(|| Builder::new().build(&mesh).unwrap())
+    };
+    let one = build(1);
+    for threads in [2, 7] {
+        assert_same(&one, &build(threads));
+    }
+}
+
+impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
+    fn sorted_primitives(&self) -> Vec<u32> {
+        let mut primitives = self.primitives().to_vec();
+        primitives.sort_unstable();
+        primitives
+    }
+}

@@ -1,0 +1,178 @@
+//! What the contract's tests share: every variant of a hierarchy, held to the reference.
+#![allow(dead_code)]
+
+use glam::Vec3;
+use proptest::{
+    prelude::*,
+    test_runner::{Config, RngSeed},
+};
+use wide_bvh::{
+    build::Builder,
+    geometry::{Hit, Ray, TriangleMesh},
+    layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
+    reference,
+    simd::Backend,
+};
+
+/// The seed of every random test, so that a failure is there again the next time.
+pub const SEED: u64 = 0x5eed_0b0e;
+
+/// `cases` cases from the fixed seed.
+pub fn config(cases: u32) -> Config {
+    Config {
+        cases,
+        rng_seed: RngSeed::Fixed(SEED),
+        failure_persistence: None,
+        ..Config::default()
+    }
+}
+
+/// A scene under every width and on every backend of this machine.
+pub struct Variants {
+    positions: Vec<[f32; 3]>,
+    indices: Vec<[u32; 3]>,
+    queries: Vec<(String, Box<dyn Fn(&Ray) -> (Option<Hit>, bool) + Sync>)>,
+}
+
+impl Variants {
+    pub fn new(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Self {
+        let mut queries = Vec::new();
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let builder = Builder::new().drop_non_finite(true);
+        add_width(&mut queries, builder.build_as::<Node8>(&mesh).unwrap());
+        add_width(&mut queries, builder.build_as::<Node4>(&mesh).unwrap());
+        Self {
+            positions,
+            indices,
+            queries,
+        }
+    }
+
+    pub fn mesh(&self) -> TriangleMesh<'_> {
+        TriangleMesh::new(&self.positions, &self.indices).unwrap()
+    }
+
+    /// The reference's answer, if every variant gives it, bit for bit.
+    pub fn check(&self, ray: &Ray) -> Result<Option<Hit>, String> {
+        let expected = reference::closest_hit(&self.mesh(), ray);
+        for (name, query) in &self.queries {
+            let (hit, any) = query(ray);
+            if bits(hit) != bits(expected) {
+                return Err(format!("{name}: {hit:?}, not {expected:?}, for {ray:?}"));
+            }
+            if any != expected.is_some() {
+                return Err(format!(
+                    "{name}: any hit {any}, not {expected:?}, for {ray:?}"
+                ));
+            }
+        }
+        Ok(expected)
+    }
+
+    /// Every variant's closest hit, if they agree; for scenes too large for the reference.
+    pub fn agreed(&self, ray: &Ray) -> Result<Option<Hit>, String> {
+        let expected = self.queries[0].1(ray).0;
+        for (name, query) in &self.queries {
+            let (hit, any) = query(ray);
+            if bits(hit) != bits(expected) || any != expected.is_some() {
+                return Err(format!(
+                    "{name}: {hit:?}, {any}, not {expected:?}, for {ray:?}"
+                ));
+            }
+        }
+        Ok(expected)
+    }
+}
+
+fn add_width<N: WideNode + Sync>(
+    queries: &mut Vec<(String, Box<dyn Fn(&Ray) -> (Option<Hit>, bool) + Sync>)>,
+    bvh: Bvh<N, TriangleLeaf, Owned>,
+) {
+    for backend in Backend::available() {
+        let mut bvh = bvh.clone();
+        bvh.set_backend(backend);
+        queries.push((
+            format!("{}-wide, {}", N::WIDTH, backend.name()),
+            Box::new(move |ray| (bvh.closest_hit(ray), bvh.any_hit(ray))),
+        ));
+    }
+}
+
+/// A hit as bits, for -0 to differ from 0.
+pub fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
+    hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive])
+}
+
+/// Any float at all, NaN, infinities, zeros and denormals as likely as the others together.
+pub fn any_float() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        any::<u32>().prop_map(f32::from_bits),
+        prop::sample::select(vec![
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MIN_POSITIVE,
+            -f32::MIN_POSITIVE,
+            f32::from_bits(1),
+            -f32::from_bits(1),
+            f32::MAX,
+            f32::MIN,
+            f32::EPSILON,
+        ]),
+        -2.0f32..2.0,
+    ]
+}
+
+/// Coordinates that often coincide, and often do not.
+pub fn coordinate() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        (-3i8..=3).prop_map(f32::from),
+        (-8i8..=8).prop_map(|x| f32::from(x) / 4.0 + 0.1),
+        -3.0f32..3.0,
+    ]
+}
+
+pub fn point() -> impl Strategy<Value = [f32; 3]> {
+    [coordinate(), coordinate(), coordinate()]
+}
+
+/// Triangles that share vertices, cross one another, lie in planes of an axis, are degenerate.
+pub fn soup(
+    triangles: std::ops::Range<usize>,
+) -> impl Strategy<Value = (Vec<[f32; 3]>, Vec<[u32; 3]>)> {
+    prop::collection::vec(point(), 3..40).prop_flat_map(move |positions| {
+        let index = 0..positions.len() as u32;
+        let corners = [index.clone(), index.clone(), index];
+        (
+            Just(positions),
+            prop::collection::vec(corners, triangles.clone()),
+        )
+    })
+}
+
+/// Where on a triangle a ray is aimed, as weights of its second and third corner.
+pub fn target() -> impl Strategy<Value = (f32, f32)> {
+    prop_oneof![
+        Just((0.0, 0.0)),
+        Just((1.0, 0.0)),
+        Just((0.0, 1.0)),
+        (0.0f32..=1.0).prop_map(|u| (u, 0.0)),
+        (0.0f32..=1.0).prop_map(|v| (0.0, v)),
+        (0.0f32..=1.0).prop_map(|u| (u, 1.0 - u)),
+        (0.0f32..=1.0, 0.0f32..=1.0).prop_map(|(u, v)| if u + v > 1.0 {
+            (1.0 - u, 1.0 - v)
+        } else {
+            (u, v)
+        }),
+    ]
+}
+
+/// The point of a triangle with the given weights.
+pub fn point_on(triangle: [Vec3; 3], (u, v): (f32, f32)) -> Vec3 {
+    let [a, b, c] = triangle;
+    a + u * (b - a) + v * (c - a)
+}
