@@ -3,15 +3,19 @@
 //! No tree, no vectors: each primitive in turn. Slow, and the specification that the kernels are
 //! tested against.
 
-use crate::geometry::{Hit, PreparedRay, Ray, TriangleMesh, is_degenerate, pow2};
-use crate::primitive::{PrimitiveHit, Primitives, custom};
+use crate::{
+    geometry::{Hit, Ray, TriangleMesh, is_degenerate},
+    primitive::{PrimitiveHit, Primitives, custom},
+    slab::{PreparedRay, pow2},
+};
 use glam::Vec3;
 
 /// The closest hit on a mesh: of all triangles that are hit within the ray's range the one of least `t`,
 /// of equal ones the one of least number. Triangles with a corner that is NaN or infinite are never hit, nor
 /// those whose corners lie on one line.
 pub fn closest_hit(mesh: &TriangleMesh, ray: &Ray) -> Option<Hit> {
-    let prepared = PreparedRay::new(ray)?;
+    let mut room = PreparedRay::ROOM;
+    let prepared = PreparedRay::new(ray, &mut room)?;
     let mut best: Option<Hit> = None;
     for (corners, primitive) in triangles(mesh).zip(0..) {
         if let Some([t, u, v]) = intersect_triangle(&prepared, corners)
@@ -29,7 +33,7 @@ pub fn closest_hit(mesh: &TriangleMesh, ray: &Ray) -> Option<Hit> {
 
 /// Whether the ray hits any triangle of a mesh within its range.
 pub fn any_hit(mesh: &TriangleMesh, ray: &Ray) -> bool {
-    PreparedRay::new(ray).is_some_and(|prepared| {
+    PreparedRay::new(ray, &mut PreparedRay::ROOM.clone()).is_some_and(|prepared| {
         triangles(mesh).any(|corners| {
             intersect_triangle(&prepared, corners).is_some() && !is_degenerate(corners)
         })
@@ -42,7 +46,8 @@ pub fn closest_primitive<P: Primitives + ?Sized>(
     count: u32,
     ray: &Ray,
 ) -> Option<PrimitiveHit<P::Detail>> {
-    let prepared = PreparedRay::new(ray)?;
+    let mut room = PreparedRay::ROOM;
+    let prepared = PreparedRay::new(ray, &mut room)?;
     let mut best: Option<PrimitiveHit<P::Detail>> = None;
     for primitive in 0..count {
         if let Some((t, detail)) = custom::intersect(primitives, primitive, ray, &prepared)
@@ -74,10 +79,23 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     if !corners.iter().all(|corner| corner.is_finite()) {
         return None;
     }
-    let [kx, ky, kz] = ray.axes;
-    let origin = Vec3::from_array(ray.origin);
+    let [kx, ky, kz] = *ray.axes;
+    let Ray {
+        origin,
+        direction,
+        t_min,
+        t_max,
+    } = *ray.ray;
+    // Cut off at 2^48, for directions that are zero, or next to it.
+    let reciprocal = direction
+        .to_array()
+        .map(|d| (1.0 / d).clamp(-pow2(48), pow2(48)));
     let [a, b, c] = corners.map(|corner| corner - origin);
-    let shear = |p: Vec3| [p[kx] - ray.shear[0] * p[kz], p[ky] - ray.shear[1] * p[kz]];
+    let shear = [
+        direction[kx] * reciprocal[kz],
+        direction[ky] * reciprocal[kz],
+    ];
+    let shear = |p: Vec3| [p[kx] - shear[0] * p[kz], p[ky] - shear[1] * p[kz]];
     let ([ax, ay], [bx, by], [cx, cy]) = (shear(a), shear(b), shear(c));
 
     let cross64 = |px: f32, py: f32, qx: f32, qy: f32| {
@@ -112,7 +130,7 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     };
 
     let z = a[kz] + u * (b[kz] - a[kz]) + v * (c[kz] - a[kz]);
-    let t = z * ray.reciprocal[kz];
+    let t = z * reciprocal[kz];
     if !t.is_finite() {
         return None;
     }
@@ -123,11 +141,11 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     let error = 12.0 * pow2(-24) * largest;
     let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
     for axis in 0..3 {
-        let r = ray.reciprocal[axis];
+        let r = reciprocal[axis];
         let e = error * r.abs();
         near = near.max((lo[axis] * r).min(hi[axis] * r) - e);
         far = far.min((lo[axis] * r).max(hi[axis] * r) + e);
     }
     let t = t.max(near).min(far) + 0.0;
-    (t.is_finite() && ray.t_min <= t && t <= ray.t_max).then_some([t, u + 0.0, v + 0.0])
+    (t.is_finite() && t_min <= t && t <= t_max).then_some([t, u + 0.0, v + 0.0])
 }

@@ -4,12 +4,10 @@ mod aabb;
 mod degenerate;
 mod hit;
 mod mesh;
-mod prepared;
 mod ray;
 
 pub use aabb::Aabb;
 pub(crate) use degenerate::is_degenerate;
 pub use hit::Hit;
 pub use mesh::{MeshError, Position, TriangleIndices, TriangleMesh};
-pub(crate) use prepared::{PreparedRay, pow2};
 pub use ray::Ray;

@@ -1,5 +1,6 @@
 //! Rays as the caller gives them.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// The points `origin + t * direction` for `t` in [`t_min`, `t_max`](Self::t_max), ends included.
@@ -7,7 +8,8 @@ use glam::Vec3;
 /// Any finite direction but zero will do: it need not be normalised, and its components may be zero,
 /// negative zero, denormal or huge. A ray that holds a NaN, an infinite origin or direction, a zero
 /// direction or an empty range is no error: it hits nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Ray {
     /// Where `t` is 0.
     pub origin: Vec3,

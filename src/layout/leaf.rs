@@ -75,7 +75,7 @@ impl TriangleLeaf {
     pub(crate) fn test<T: Simd>(
         &self,
         token: T,
-        ray: &RayShear<8, T::F32x8>,
+        ray: &RayShear<'_, T::F32x8>,
         t_max: f32,
     ) -> Option<TriangleHits<T::F32x8>> {
         let vertices = ray.shear(token, &self.vertices);

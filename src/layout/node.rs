@@ -2,7 +2,7 @@
 
 use super::Child;
 use crate::{
-    geometry::Aabb,
+    geometry::{Aabb, Ray},
     simd::{Simd, Vector},
     slab::{Planes, RaySlabs},
 };
@@ -33,7 +33,8 @@ pub trait WideNode: Pod + Sealed {
     #[doc(hidden)]
     fn slabs<S: Simd>(
         token: S,
-        ray: &crate::geometry::PreparedRay,
+        ray: &Ray,
+        reciprocal: [S::F32x8; 3],
         bounds: &Aabb,
     ) -> Self::Slabs<S>;
     #[doc(hidden)]
@@ -83,7 +84,7 @@ pub type Node4 = Node<4, Align16>;
 pub type Node8 = Node<8, Align32>;
 
 macro_rules! impl_wide_node {
-    ($node:ty, $width:literal, $vector:ident, $bytes:literal) => {
+    ($node:ty, $width:literal, $vector:ident, $bytes:literal, $narrow:expr) => {
         const _: () = assert!(size_of::<$node>() == $bytes);
 
         // SAFETY: floats and integers alone, `repr(C)`, and no padding: the size above is the sum
@@ -115,10 +116,11 @@ macro_rules! impl_wide_node {
             #[inline(always)]
             fn slabs<S: Simd>(
                 token: S,
-                ray: &crate::geometry::PreparedRay,
+                ray: &Ray,
+                [x, y, z]: [S::F32x8; 3],
                 bounds: &Aabb,
             ) -> Self::Slabs<S> {
-                RaySlabs::new(token, ray, bounds)
+                RaySlabs::new(token, ray, [$narrow(x), $narrow(y), $narrow(z)], bounds)
             }
 
             #[inline(always)]
@@ -144,8 +146,8 @@ macro_rules! impl_wide_node {
     };
 }
 
-impl_wide_node!(Node4, 4, F32x4, 112);
-impl_wide_node!(Node8, 8, F32x8, 224);
+impl_wide_node!(Node4, 4, F32x4, 112, S::low);
+impl_wide_node!(Node8, 8, F32x8, 224, core::convert::identity);
 
 impl<const W: usize, A> Node<W, A> {
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {

@@ -1,7 +1,10 @@
 //! A caller's own primitives.
 
-use crate::geometry::{Aabb, PreparedRay, Ray};
-use crate::{simd::Portable, slab::primitive_interval};
+use crate::{
+    geometry::{Aabb, Ray},
+    simd::{Portable, splat3},
+    slab::{PreparedRay, primitive_interval, reciprocal},
+};
 
 /// Primitives that the caller keeps and intersects: spheres, curves, voxels, whole objects.
 ///
@@ -46,11 +49,13 @@ pub(crate) fn intersect<P: Primitives + ?Sized>(
     let aabb = primitives.aabb(primitive);
     let (lo, hi) = (aabb.min.to_array(), aabb.max.to_array());
     let relative = |bound: [f32; 3]| {
-        [0, 1, 2].map(|axis| wide::f32x4::splat(bound[axis] - prepared.origin[axis]))
+        [0, 1, 2].map(|axis| wide::f32x4::splat(bound[axis] - prepared.ray.origin[axis]))
     };
-    let interval = primitive_interval(Portable, prepared.reciprocal, relative(lo), relative(hi));
+    let direction: [wide::f32x4; 3] = splat3(Portable, prepared.ray.direction.to_array());
+    let reciprocal = direction.map(|d| reciprocal(Portable, d));
+    let interval = primitive_interval(Portable, reciprocal, relative(lo), relative(hi));
     let (near, far) = (interval.0.to_array()[0], interval.1.to_array()[0]);
-    if !(near <= far && near <= prepared.t_max && prepared.t_min <= far) {
+    if !(near <= far && near <= prepared.ray.t_max && prepared.ray.t_min <= far) {
         return None;
     }
     let (t, detail) = primitives.intersect(primitive, ray)?;
@@ -59,5 +64,5 @@ pub(crate) fn intersect<P: Primitives + ?Sized>(
     }
     // Adding 0 turns -0 into 0, for ties to be ties.
     let t = prepared.scaled(t).max(near).min(far) + 0.0;
-    (t.is_finite() && prepared.t_min <= t && t <= prepared.t_max).then_some((t, detail))
+    (t.is_finite() && prepared.ray.t_min <= t && t <= prepared.ray.t_max).then_some((t, detail))
 }

@@ -15,19 +15,20 @@
 //! opposite, so it is never hit.
 
 use crate::{
-    geometry::{PreparedRay, pow2},
-    simd::{Vector, splat3},
-    slab::primitive_interval,
+    geometry::Ray,
+    simd::Vector,
+    slab::{PreparedRay, pow2, primitive_interval},
 };
 
-/// What the triangle test needs of a ray, in every lane.
+/// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
+/// no more than to load a vector, and many rays never get to a leaf.
 #[derive(Clone, Copy)]
-pub struct RayShear<const N: usize, V> {
-    origin: [V; 3],
-    shear: [V; 2],
-    axes: [usize; 3],
-    reciprocal: [f32; 3],
-    t_min: V,
+pub(crate) struct RayShear<'a, V> {
+    ray: &'a Ray,
+    /// Of the shear.
+    axes: &'static [usize; 3],
+    /// By the caller's axes.
+    reciprocal: [V; 3],
 }
 
 /// Vertices, one a lane, as the ray sees them.
@@ -61,46 +62,56 @@ pub struct TriangleHits<V> {
 const MIN_DETERMINANT: f32 = pow2(-100);
 const MAX_DETERMINANT: f32 = pow2(126);
 
-impl<const N: usize, V: Vector<N>> RayShear<N, V> {
+impl<'a, V> RayShear<'a, V> {
+    /// `reciprocal` is [`PreparedRay::reciprocals`].
     #[inline(always)]
-    pub(crate) fn new(token: V::Token, ray: &PreparedRay) -> Self {
-        let along = |values: [f32; 3]| ray.axes.map(|axis| values[axis]);
+    pub(crate) fn new(prepared: &PreparedRay<'a>, reciprocal: [V; 3]) -> Self {
         Self {
-            origin: splat3(token, along(ray.origin)),
-            shear: [
-                V::splat(token, ray.shear[0]),
-                V::splat(token, ray.shear[1]),
-            ],
-            axes: ray.axes,
-            reciprocal: along(ray.reciprocal),
-            t_min: V::splat(token, ray.t_min),
+            ray: prepared.ray,
+            axes: prepared.axes,
+            reciprocal,
         }
     }
 
     /// Moves and shears vertices, given as arrays of x, of y and of z.
     #[inline(always)]
-    pub(crate) fn shear(&self, token: V::Token, vertices: &[[f32; N]; 3]) -> Sheared<V> {
-        // The axes are 0 to 2; `min` tells the compiler.
-        let x = V::load(token, &vertices[self.axes[0].min(2)]) - self.origin[0];
-        let y = V::load(token, &vertices[self.axes[1].min(2)]) - self.origin[1];
-        let z = V::load(token, &vertices[self.axes[2].min(2)]) - self.origin[2];
+    pub(crate) fn shear<const N: usize>(
+        &self,
+        token: V::Token,
+        vertices: &[[f32; N]; 3],
+    ) -> Sheared<V>
+    where
+        V: Vector<N>,
+    {
+        let [kx, ky, kz] = *self.axes;
+        // As arrays: glam's index branches.
+        let (origin, direction): (&[f32; 3], &[f32; 3]) =
+            (self.ray.origin.as_ref(), self.ray.direction.as_ref());
+        let x = V::load(token, &vertices[kx]) - V::splat(token, origin[kx]);
+        let y = V::load(token, &vertices[ky]) - V::splat(token, origin[ky]);
+        let z = V::load(token, &vertices[kz]) - V::splat(token, origin[kz]);
+        let shear_x = V::splat(token, direction[kx]) * self.reciprocal[kz];
+        let shear_y = V::splat(token, direction[ky]) * self.reciprocal[kz];
         Sheared {
             relative: [x, y, z],
-            x: x - self.shear[0] * z,
-            y: y - self.shear[1] * z,
+            x: x - shear_x * z,
+            y: y - shear_y * z,
         }
     }
 
     /// The first half of the test: the triangles, of those that `lanes` has a bit for, that the line of
     /// the ray goes through. `x` and `y` are the three corners after the shear.
     #[inline(always)]
-    pub(crate) fn cross(
+    pub(crate) fn cross<const N: usize>(
         &self,
         token: V::Token,
         [ax, bx, cx]: [V; 3],
         [ay, by, cy]: [V; 3],
         lanes: u32,
-    ) -> Option<Crossed<V>> {
+    ) -> Option<Crossed<V>>
+    where
+        V: Vector<N>,
+    {
         let zero = V::splat(token, 0.0);
         let wa = cx * by - cy * bx;
         let wb = ax * cy - ay * cx;
@@ -131,28 +142,38 @@ impl<const N: usize, V: Vector<N>> RayShear<N, V> {
     /// The second half: where the crossed triangles are hit, if that is within the ray's range up to
     /// `t_max`. `corners` are what [`Sheared::relative`] says of the three corners.
     #[inline(always)]
-    pub(crate) fn hit(
+    pub(crate) fn hit<const N: usize>(
         &self,
         token: V::Token,
         Crossed { mask, u, v }: Crossed<V>,
         corners: [[V; 3]; 3],
         t_max: V,
-    ) -> Option<TriangleHits<V>> {
+    ) -> Option<TriangleHits<V>>
+    where
+        V: Vector<N>,
+    {
         let zero = V::splat(token, 0.0);
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
-        let t = (az + u * (bz - az) + v * (cz - az)) * V::splat(token, self.reciprocal[2]);
+        let [kx, ky, kz] = *self.axes;
+        let reciprocal = [
+            self.reciprocal[kx],
+            self.reciprocal[ky],
+            self.reciprocal[kz],
+        ];
+        let t = (az + u * (bz - az) + v * (cz - az)) * reciprocal[2];
         // Before `t` is moved, too, for that would hide a NaN on some backends.
         let infinity = V::splat(token, f32::INFINITY);
         let finite = t.abs().lt(infinity);
         let (near, far) = primitive_interval(
             token,
-            self.reciprocal,
+            reciprocal,
             [ax.min(bx).min(cx), ay.min(by).min(cy), az.min(bz).min(cz)],
             [ax.max(bx).max(cx), ay.max(by).max(cy), az.max(bz).max(cz)],
         );
         // Adding 0 turns -0 into 0, whose sign `min` and `max` leave open.
         let t = t.max(near).min(far) + zero;
-        let in_range = self.t_min.le(t) & t.le(t_max) & finite & t.abs().lt(infinity);
+        let in_range =
+            V::splat(token, self.ray.t_min).le(t) & t.le(t_max) & finite & t.abs().lt(infinity);
         let mask = mask & in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,

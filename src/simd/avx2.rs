@@ -20,6 +20,12 @@ impl Avx2 {
 impl Simd for Avx2 {
     type F32x4 = F32x4;
     type F32x8 = F32x8;
+
+    #[inline(always)]
+    fn low(vector: F32x8) -> F32x4 {
+        // SAFETY: the vector exists only where an `Avx2` token was given.
+        F32x4(unsafe { _mm256_castps256_ps128(vector.0) })
+    }
 }
 
 /// Four floats. Made from an [`Avx2`] token or another vector alone.

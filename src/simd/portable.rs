@@ -10,6 +10,12 @@ pub struct Portable;
 impl Simd for Portable {
     type F32x4 = f32x4;
     type F32x8 = f32x8;
+
+    #[inline(always)]
+    fn low(vector: f32x8) -> f32x4 {
+        let [a, b, c, d, ..] = vector.to_array();
+        f32x4::new([a, b, c, d])
+    }
 }
 
 macro_rules! impl_vector {

@@ -8,6 +8,9 @@ pub trait Simd: Copy {
     type F32x4: Vector<4, Token = Self>;
     /// Eight floats.
     type F32x8: Vector<8, Token = Self>;
+
+    /// The first four of eight.
+    fn low(vector: Self::F32x8) -> Self::F32x4;
 }
 
 /// `N` floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.
@@ -57,9 +60,5 @@ pub trait Vector<const N: usize>:
 // Not a closure given to `map`: closures do not inherit a backend's instructions and stay calls.
 #[inline(always)]
 pub fn splat3<const N: usize, V: Vector<N>>(token: V::Token, [x, y, z]: [f32; 3]) -> [V; 3] {
-    [
-        V::splat(token, x),
-        V::splat(token, y),
-        V::splat(token, z),
-    ]
+    [V::splat(token, x), V::splat(token, y), V::splat(token, z)]
 }

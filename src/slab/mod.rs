@@ -2,8 +2,7 @@
 //!
 //! # Why it never loses a hit
 //!
-//! Let u = 2^-24, o the ray's origin, d its scaled direction (largest component in [1, 2)), r its
-//! reciprocals, D the largest over the axes of |scene bound| + |o|. A box plane p is met at
+//! Let u = 2^-24, o the ray's origin, d its direction (largest component in 2^-23 to 2^24), r its reciprocals, D the largest over the axes of |scene bound| + |o|. A box plane p is met at
 //!
 //! ```text
 //! near = p·r + (-(o·r) - E),  far = p·r + (-(o·r) + E),  E = K_BOX·u·D·|r|
@@ -22,19 +21,19 @@
 //! *(1) n and f are in order, and a point of the ray that meets the triangle lies between.* The edge
 //! functions have exact signs, so an accepted triangle, sheared *as computed*, holds 0: weights w >= 0
 //! of sum 1 exist with Σ w·x' = 0 and Σ w·y' = 0 exactly. A sheared x' = fl(X - fl(s·Z)), where X and Z
-//! are rounded differences and s a rounded quotient, is off from the exact shear by at most
-//! u·|X| (difference) + 3u·|Z| (difference, quotient, product; |s| <= 1) + u·(|X| + |Z|) (last
-//! difference) <= 6u·M. So at t* = Σ w·Z / d.z the ray is within 6u·M, on each axis, of the point
-//! Σ w·vertex of the triangle, and exactly there along z. Hence (lo - o) - 6u·M <= d·t* <= (hi - o) + 6u·M,
-//! and, multiplied by |r|: exact n - 6u·M·|r| <= t* <= exact f + 6u·M·|r| on each axis. Computing
+//! are rounded differences and s a product with a rounded reciprocal, is off from the exact shear by at most
+//! u·|X| (difference) + 4u·|Z| (difference, reciprocal, quotient, product; |s| <= 1) + u·(|X| + |Z|) (last
+//! difference) <= 7u·M. So at t* = Σ w·Z / d.z the ray is within 7u·M, on each axis, of the point
+//! Σ w·vertex of the triangle, and exactly there along z. Hence (lo - o) - 7u·M <= d·t* <= (hi - o) + 7u·M,
+//! and, multiplied by |r|: exact n - 7u·M·|r| <= t* <= exact f + 7u·M·|r| on each axis. Computing
 //! (lo - o)·r - e adds at most u·M·|r| each for the difference, the reciprocal, the product and the last
-//! difference. 6 + 4 = 10, and second-order terms are far below 1: **K_PRIMITIVE = 12** gives
+//! difference. 7 + 4 = 11, and second-order terms are far below 1: **K_PRIMITIVE = 12** gives
 //! n <= t* <= f on every pair of axes.
 //!
 //! *(2) The same where r was cut off* at R = 2^48, that is |d| < 1/R: multiplied by R, the inequality reads
-//! (lo - o)·R <= d·R·t* + 6u·M·R with |d·R| <= 1, so |t*| has to fit in what is left of K_PRIMITIVE,
-//! 12 - 6 - 3 > 2 u·M·R = 2^25·M. And |t*| <= M / |d.z| <= 2^23·M, for d.z is at least 2^-23 even for
-//! denormal directions. This is why R is not smaller.
+//! (lo - o)·R <= d·R·t* + 7u·M·R with |d·R| <= 1, so |t*| has to fit in what is left of K_PRIMITIVE,
+//! 12 - 7 - 3 > 1 u·M·R = 2^24·M. And |t*| <= M / |d.z| <= 2^23·M, for d.z, the
+//! largest component, is at least 2^-23. This is why R is not smaller.
 //!
 //! *(3) near(box) <= n <= t and t <= f <= far(box) for each box above.* Bounds of a box are no tighter
 //! than the triangle's, and each formula is monotone in the plane, rounding included, so it is enough
@@ -57,8 +56,12 @@
 //! and Ize, "Robust BVH Ray Traversal" (2013), which widens far by two ULPs; they cover the rounding
 //! of the box test, not that of the triangle test.
 
+mod prepared;
+
+pub(crate) use prepared::{PreparedRay, pow2, reciprocal};
+
 use crate::{
-    geometry::{Aabb, PreparedRay, pow2},
+    geometry::{Aabb, Ray},
     simd::{Vector, splat3},
 };
 
@@ -88,32 +91,52 @@ pub struct RaySlabs<const N: usize, V> {
 pub type Planes<const N: usize> = [[[f32; N]; 2]; 3];
 
 impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
-    /// For boxes within `bounds`.
+    /// For boxes within `bounds`. `reciprocal` is [`PreparedRay::reciprocals`], narrowed.
     #[inline(always)]
-    pub(crate) fn new(token: V::Token, ray: &PreparedRay, bounds: &Aabb) -> Self {
-        let scene = bounds.min.abs().max(bounds.max.abs()).to_array();
-        let mut extent = MIN_EXTENT;
-        for (bound, origin) in scene.into_iter().zip(ray.origin) {
-            extent = extent.max(bound + origin.abs());
+    pub(crate) fn new(token: V::Token, ray: &Ray, reciprocal: [V; 3], bounds: &Aabb) -> Self {
+        let origin: [V; 3] = splat3(token, ray.origin.to_array());
+        let (lo, hi): ([V; 3], [V; 3]) = (
+            splat3(token, bounds.min.to_array()),
+            splat3(token, bounds.max.to_array()),
+        );
+        let mut extent = V::splat(token, MIN_EXTENT);
+        for axis in 0..3 {
+            extent = extent.max(lo[axis].abs().max(hi[axis].abs()) + origin[axis].abs());
         }
-        let axis = |axis: usize| -> [f32; 3] {
-            let r = ray.reciprocal[axis];
-            if extent < MAX_EXTENT {
-                let error = K_BOX * UNIT_ROUNDOFF * extent * r.abs();
-                let at_origin = -(ray.origin[axis] * r);
-                [r, at_origin - error, at_origin + error]
-            } else {
-                [pow2(-126).copysign(r), -f32::MAX, f32::MAX]
-            }
-        };
-        let (x, y, z) = (axis(0), axis(1), axis(2));
-        let [r, near, far] = [0, 1, 2].map(|i| [x[i], y[i], z[i]]);
-        Self {
-            reciprocal: splat3(token, r),
-            near: splat3(token, near),
-            far: splat3(token, far),
+        let error = extent * V::splat(token, K_BOX * UNIT_ROUNDOFF);
+        let zero = V::splat(token, 0.0);
+        let mut slabs = Self {
+            reciprocal,
+            near: [zero; 3],
+            far: [zero; 3],
             t_min: V::splat(token, ray.t_min),
-            negative: ray.reciprocal.map(|r| r.is_sign_negative() as usize),
+            negative: [
+                (ray.direction.x.to_bits() >> 31) as usize,
+                (ray.direction.y.to_bits() >> 31) as usize,
+                (ray.direction.z.to_bits() >> 31) as usize,
+            ],
+        };
+        for axis in 0..3 {
+            let at_origin = zero - origin[axis] * reciprocal[axis];
+            let error = error * reciprocal[axis].abs();
+            slabs.near[axis] = at_origin - error;
+            slabs.far[axis] = at_origin + error;
+        }
+        if extent.lt(V::splat(token, MAX_EXTENT)).bits() == 0 {
+            slabs.open(token);
+        }
+        slabs
+    }
+
+    /// Has every box passed but the empty one.
+    #[cold]
+    #[inline(never)]
+    fn open(&mut self, token: V::Token) {
+        for axis in 0..3 {
+            let sign = [1.0, -1.0][self.negative[axis]];
+            self.reciprocal[axis] = V::splat(token, sign * pow2(-126));
+            self.near[axis] = V::splat(token, -f32::MAX);
+            self.far[axis] = V::splat(token, f32::MAX);
         }
     }
 
@@ -146,7 +169,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
 #[inline(always)]
 pub(crate) fn primitive_interval<const N: usize, V: Vector<N>>(
     token: V::Token,
-    reciprocal: [f32; 3],
+    reciprocal: [V; 3],
     lo: [V; 3],
     hi: [V; 3],
 ) -> (V, V) {
@@ -158,7 +181,7 @@ pub(crate) fn primitive_interval<const N: usize, V: Vector<N>>(
     let mut near = V::splat(token, f32::NEG_INFINITY);
     let mut far = V::splat(token, f32::INFINITY);
     for axis in 0..3 {
-        let r = V::splat(token, reciprocal[axis]);
+        let r = reciprocal[axis];
         let (a, b) = (lo[axis] * r, hi[axis] * r);
         let e = error * r.abs();
         let (enter, leave) = (a.min(b) - e, a.max(b) + e);

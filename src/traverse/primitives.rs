@@ -2,10 +2,11 @@
 
 use super::single::{Visitor, walk};
 use crate::{
-    geometry::{PreparedRay, Ray},
+    geometry::Ray,
     layout::{Bvh, PrimitiveLeaf, Storage, WideNode},
     primitive::{PrimitiveHit, Primitives, custom::intersect},
     simd::{Operation, Simd},
+    slab::PreparedRay,
 };
 use core::ops::ControlFlow;
 
@@ -18,7 +19,8 @@ impl<N: WideNode, S: Storage> Bvh<N, PrimitiveLeaf, S> {
         primitives: &P,
         ray: &Ray,
     ) -> Option<PrimitiveHit<P::Detail>> {
-        let prepared = PreparedRay::new(ray)?;
+        let mut room = PreparedRay::ROOM;
+        let prepared = PreparedRay::new(ray, &mut room)?;
         let hit = self.backend().run(Query::<_, _, _, true> {
             bvh: self,
             primitives,
@@ -35,7 +37,7 @@ impl<N: WideNode, S: Storage> Bvh<N, PrimitiveLeaf, S> {
     /// finds something, and sooner.
     #[inline]
     pub fn any_hit<P: Primitives + ?Sized>(&self, primitives: &P, ray: &Ray) -> bool {
-        PreparedRay::new(ray).is_some_and(|prepared| {
+        PreparedRay::new(ray, &mut PreparedRay::ROOM.clone()).is_some_and(|prepared| {
             let query = Query::<_, _, _, false> {
                 bvh: self,
                 primitives,
@@ -52,7 +54,7 @@ struct Query<'a, N: WideNode, S: Storage, P: ?Sized, const CLOSEST: bool> {
     bvh: &'a Bvh<N, PrimitiveLeaf, S>,
     primitives: &'a P,
     ray: &'a Ray,
-    prepared: &'a PreparedRay,
+    prepared: &'a PreparedRay<'a>,
 }
 
 impl<N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> Operation
@@ -68,7 +70,8 @@ impl<N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> Opera
             query: self,
             found: None,
         };
-        walk(token, bvh, prepared, &mut visitor);
+        let reciprocal = prepared.reciprocals(token);
+        walk(token, bvh, prepared.ray, reciprocal, &mut visitor);
         visitor.found
     }
 }
@@ -109,6 +112,6 @@ impl<N: WideNode, S: Storage, P: Primitives + ?Sized, const CLOSEST: bool> Visit
                 }
             }
         }
-        ControlFlow::Continue(self.found.map_or(prepared.t_max, |best| best.t))
+        ControlFlow::Continue(self.found.map_or(prepared.ray.t_max, |best| best.t))
     }
 }

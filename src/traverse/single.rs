@@ -1,7 +1,7 @@
 //! The walk of one ray through a hierarchy.
 
 use crate::{
-    geometry::PreparedRay,
+    geometry::Ray,
     layout::{Bvh, Child, Leaf, STACK, Storage, WideNode},
     simd::Simd,
 };
@@ -28,19 +28,21 @@ struct Entry {
     child: Child,
 }
 
-/// Takes `visitor` to every leaf whose box the ray passes within its range, which shrinks on the way.
+/// Takes `visitor` to every leaf whose box the ray passes within its range, which shrinks on the way. The ray is a
+/// prepared one's, and so are the reciprocals of its direction.
 #[inline(always)]
 pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
     token: T,
     bvh: &Bvh<N, L, S>,
-    ray: &PreparedRay,
+    ray: &Ray,
+    reciprocal: [T::F32x8; 3],
     visitor: &mut V,
 ) {
     if bvh.root() == Child::EMPTY {
         return;
     }
     let (nodes, leaves) = (bvh.nodes(), bvh.leaves());
-    let slabs = N::slabs(token, ray, bvh.bounds());
+    let slabs = N::slabs(token, ray, reciprocal, bvh.bounds());
     let mut t_max = ray.t_max;
     let mut stack = [MaybeUninit::<Entry>::uninit(); STACK];
     let mut len = 0;

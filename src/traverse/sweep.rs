@@ -3,42 +3,52 @@
 //! For a handful of boxes or triangles that need no tree, and to measure how fast the tests are by themselves.
 
 use crate::{
-    geometry::{Aabb, PreparedRay, Ray},
+    geometry::{Aabb, Ray},
     layout::{TriangleLeaf, WideNode},
     primitive::triangle::RayShear,
     simd::{Backend, Operation, Simd},
+    slab::PreparedRay,
 };
 
 /// How many children of `nodes`, all within `bounds`, the ray passes the boxes of. 0 for a ray that can hit nothing.
 pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ray: &Ray) -> u32 {
-    struct Boxes<'a, N>(&'a [N], &'a Aabb, PreparedRay);
+    struct Boxes<'a, N>(&'a [N], &'a Aabb, &'a Ray);
     impl<N: WideNode> Operation for Boxes<'_, N> {
         type Output = u32;
         #[inline(always)]
         fn run<T: Simd>(self, token: T) -> u32 {
-            let slabs = N::slabs(token, &self.2, self.1);
-            let t_max = N::splat(token, self.2.t_max);
+            let mut room = PreparedRay::ROOM;
+            let Some(prepared) = PreparedRay::new(self.2, &mut room) else {
+                return 0;
+            };
+            let reciprocal = prepared.reciprocals(token);
+            let slabs = N::slabs(token, prepared.ray, reciprocal, self.1);
+            let t_max = N::splat(token, prepared.ray.t_max);
             let passed = |node: &N| node.test(token, &slabs, t_max).0.count_ones();
             self.0.iter().map(passed).sum()
         }
     }
-    PreparedRay::new(ray).map_or(0, |ray| backend.run(Boxes(nodes, bounds, ray)))
+    backend.run(Boxes(nodes, bounds, ray))
 }
 
 /// How many triangles of `leaves` the ray hits within its range.
 pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> u32 {
-    struct Triangles<'a>(&'a [TriangleLeaf], PreparedRay);
+    struct Triangles<'a>(&'a [TriangleLeaf], &'a Ray);
     impl Operation for Triangles<'_> {
         type Output = u32;
         #[inline(always)]
         fn run<T: Simd>(self, token: T) -> u32 {
-            let shear = RayShear::new(token, &self.1);
+            let mut room = PreparedRay::ROOM;
+            let Some(prepared) = PreparedRay::new(self.1, &mut room) else {
+                return 0;
+            };
+            let shear = RayShear::new(&prepared, prepared.reciprocals(token));
             let hits = |leaf: &TriangleLeaf| {
-                leaf.test(token, &shear, self.1.t_max)
+                leaf.test(token, &shear, prepared.ray.t_max)
                     .map_or(0, |hits| hits.mask.count_ones())
             };
             self.0.iter().map(hits).sum()
         }
     }
-    PreparedRay::new(ray).map_or(0, |ray| backend.run(Triangles(leaves, ray)))
+    backend.run(Triangles(leaves, ray))
 }

@@ -6,10 +6,11 @@ use super::{
     single::{Visitor, walk},
 };
 use crate::{
-    geometry::{Hit, PreparedRay, Ray},
+    geometry::{Hit, Ray},
     layout::{Bvh, Storage, TriangleLeaf, WideNode},
     primitive::triangle::{RayShear, bits},
     simd::{Operation, Simd, Vector},
+    slab::PreparedRay,
 };
 use core::ops::ControlFlow;
 
@@ -18,37 +19,19 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
     /// ones the one of least number.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let prepared = PreparedRay::new(ray)?;
-        let found = self.backend().run(Closest {
-            bvh: self,
-            ray: &prepared,
-        })?;
-        Some(found.hit(self.primitives(), ray, &prepared))
+        self.backend().run(Closest { bvh: self, ray })
     }
 
     /// Whether the ray hits anything within its range: just when [`closest_hit`](Self::closest_hit)
     /// finds something, and sooner.
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        PreparedRay::new(ray).is_some_and(|prepared| {
-            self.backend().run(Any {
-                bvh: self,
-                ray: &prepared,
-            })
-        })
+        self.backend().run(Any { bvh: self, ray })
     }
 
     /// [`closest_hit`](Self::closest_hit), and what it cost.
     pub fn closest_hit_counted(&self, ray: &Ray) -> (Option<Hit>, Counts) {
-        let Some(prepared) = PreparedRay::new(ray) else {
-            return (None, Counts::default());
-        };
-        let (found, counts) = self.backend().run(ClosestCounted {
-            bvh: self,
-            ray: &prepared,
-        });
-        let hit = found.map(|found| found.hit(self.primitives(), ray, &prepared));
-        (hit, counts)
+        self.backend().run(ClosestCounted { bvh: self, ray })
     }
 }
 
@@ -62,56 +45,53 @@ struct Found {
     place: usize,
 }
 
-impl Found {
-    #[inline(always)]
-    fn hit(self, primitives: &[u32], ray: &Ray, prepared: &PreparedRay) -> Hit {
-        Hit {
-            t: prepared.unscaled(self.t, ray),
-            u: self.u,
-            v: self.v,
-            primitive: primitives[self.place],
-        }
-    }
-}
-
 struct Closest<'a, N: WideNode, S: Storage> {
     bvh: &'a Bvh<N, TriangleLeaf, S>,
-    ray: &'a PreparedRay,
+    ray: &'a Ray,
 }
 
 impl<N: WideNode, S: Storage> Operation for Closest<'_, N, S> {
-    type Output = Option<Found>;
+    type Output = Option<Hit>;
 
     #[inline(always)]
-    fn run<T: Simd>(self, token: T) -> Option<Found> {
-        let mut visitor = ClosestVisitor::new(token, self.ray, self.bvh.primitives());
-        walk(token, self.bvh, self.ray, &mut visitor);
-        visitor.found
+    fn run<T: Simd>(self, token: T) -> Option<Hit> {
+        let mut room = PreparedRay::ROOM;
+        let prepared = PreparedRay::new(self.ray, &mut room)?;
+        let reciprocal = prepared.reciprocals(token);
+        let mut visitor = ClosestVisitor::new(token, &prepared, reciprocal, self.bvh.primitives());
+        walk(token, self.bvh, prepared.ray, reciprocal, &mut visitor);
+        visitor.hit(self.ray, &prepared)
     }
 }
 
 struct ClosestCounted<'a, N: WideNode, S: Storage> {
     bvh: &'a Bvh<N, TriangleLeaf, S>,
-    ray: &'a PreparedRay,
+    ray: &'a Ray,
 }
 
 impl<N: WideNode, S: Storage> Operation for ClosestCounted<'_, N, S> {
-    type Output = (Option<Found>, Counts);
+    type Output = (Option<Hit>, Counts);
 
     #[inline(always)]
-    fn run<T: Simd>(self, token: T) -> (Option<Found>, Counts) {
+    fn run<T: Simd>(self, token: T) -> (Option<Hit>, Counts) {
+        let mut room = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+            return (None, Counts::default());
+        };
+        let reciprocal = prepared.reciprocals(token);
+        let primitives = self.bvh.primitives();
         let mut counting = Counting {
-            visitor: ClosestVisitor::new(token, self.ray, self.bvh.primitives()),
+            visitor: ClosestVisitor::new(token, &prepared, reciprocal, primitives),
             counts: Counts::default(),
         };
-        walk(token, self.bvh, self.ray, &mut counting);
-        (counting.visitor.found, counting.counts)
+        walk(token, self.bvh, prepared.ray, reciprocal, &mut counting);
+        (counting.visitor.hit(self.ray, &prepared), counting.counts)
     }
 }
 
 struct Any<'a, N: WideNode, S: Storage> {
     bvh: &'a Bvh<N, TriangleLeaf, S>,
-    ray: &'a PreparedRay,
+    ray: &'a Ray,
 }
 
 impl<N: WideNode, S: Storage> Operation for Any<'_, N, S> {
@@ -119,20 +99,25 @@ impl<N: WideNode, S: Storage> Operation for Any<'_, N, S> {
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) -> bool {
+        let mut room = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+            return false;
+        };
+        let reciprocal = prepared.reciprocals(token);
         let mut visitor = AnyVisitor {
             token,
-            shear: RayShear::new(token, self.ray),
-            t_max: self.ray.t_max,
+            shear: RayShear::new(&prepared, reciprocal),
+            t_max: prepared.ray.t_max,
             found: false,
         };
-        walk(token, self.bvh, self.ray, &mut visitor);
+        walk(token, self.bvh, prepared.ray, reciprocal, &mut visitor);
         visitor.found
     }
 }
 
 struct ClosestVisitor<'a, T: Simd> {
     token: T,
-    shear: RayShear<8, T::F32x8>,
+    shear: RayShear<'a, T::F32x8>,
     primitives: &'a [u32],
     t_max: f32,
     found: Option<Found>,
@@ -140,14 +125,30 @@ struct ClosestVisitor<'a, T: Simd> {
 
 impl<'a, T: Simd> ClosestVisitor<'a, T> {
     #[inline(always)]
-    fn new(token: T, ray: &PreparedRay, primitives: &'a [u32]) -> Self {
+    fn new(
+        token: T,
+        prepared: &PreparedRay<'a>,
+        reciprocal: [T::F32x8; 3],
+        primitives: &'a [u32],
+    ) -> Self {
         Self {
             token,
-            shear: RayShear::new(token, ray),
+            shear: RayShear::new(prepared, reciprocal),
             primitives,
-            t_max: ray.t_max,
+            t_max: prepared.ray.t_max,
             found: None,
         }
+    }
+
+    /// What was found, in the caller's terms.
+    #[inline(always)]
+    fn hit(&self, ray: &Ray, prepared: &PreparedRay) -> Option<Hit> {
+        self.found.map(|Found { t, u, v, place }| Hit {
+            t: prepared.unscaled(t, ray),
+            u,
+            v,
+            primitive: self.primitives[place],
+        })
     }
 }
 
@@ -180,14 +181,14 @@ impl<T: Simd> Visitor<TriangleLeaf> for ClosestVisitor<'_, T> {
     }
 }
 
-struct AnyVisitor<T: Simd> {
+struct AnyVisitor<'a, T: Simd> {
     token: T,
-    shear: RayShear<8, T::F32x8>,
+    shear: RayShear<'a, T::F32x8>,
     t_max: f32,
     found: bool,
 }
 
-impl<T: Simd> Visitor<TriangleLeaf> for AnyVisitor<T> {
+impl<T: Simd> Visitor<TriangleLeaf> for AnyVisitor<'_, T> {
     const NEAREST_FIRST: bool = false;
 
     #[inline(always)]

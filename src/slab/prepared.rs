@@ -1,0 +1,165 @@
+//! A ray made ready for the kernels: checked, and scaled if need be.
+
+use crate::{
+    geometry::Ray,
+    simd::{Portable, Simd, Vector, splat3},
+};
+
+/// A ray that can hit something, in numbers that the kernels can work with.
+///
+/// The largest component of its direction is within 2^-23 and 2^24. Directions of another length are
+/// multiplied by a power of two, and `t` with them: exactly, but for components 2^126 times smaller than
+/// the largest, and lengths of which no float is the inverse. What is rounded there is part of what the
+/// prepared ray *is*: every kernel, and the reference, sees this one.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedRay<'a> {
+    /// The caller's ray, or a scaled one.
+    pub(crate) ray: &'a Ray,
+    /// The axes x, y, z of the shear: z is where the direction is largest, and x, y, z turn as the
+    /// caller's axes do, mirrored if the ray runs against z.
+    pub(crate) axes: &'static [usize; 3],
+    /// What the caller's `t` was multiplied by: a power of two.
+    scale: f32,
+    /// Its inverse.
+    unscale: f32,
+}
+
+/// Above this a reciprocal is cut off, so that a direction component that is zero, or next to it, needs no
+/// branch and makes no 0 · ∞. What it must satisfy is said in [`slab`](super).
+const MAX_RECIPROCAL: f32 = pow2(48);
+
+/// 1 / direction, a component, no greater in magnitude than [`MAX_RECIPROCAL`].
+#[inline(always)]
+pub(crate) fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
+    (V::splat(token, 1.0) / direction)
+        .max(V::splat(token, -MAX_RECIPROCAL))
+        .min(V::splat(token, MAX_RECIPROCAL))
+}
+
+impl<'a> PreparedRay<'a> {
+    /// `None` if the ray can hit nothing: it holds a NaN, its origin or direction is infinite, its
+    /// direction is zero, or its range is empty. `scaled` is room for a ray that has to be scaled.
+    #[inline(always)]
+    pub(crate) fn new(ray: &'a Ray, scaled: &'a mut Ray) -> Option<Self> {
+        let [mx, my, mz] = [
+            ray.direction.x.abs(),
+            ray.direction.y.abs(),
+            ray.direction.z.abs(),
+        ];
+        let largest = greater(greater(mx, my), mz);
+        let valid = (largest > 0.0)
+            & (ray.t_min <= ray.t_max)
+            & (ray.t_min < f32::INFINITY)
+            & is_finite(ray);
+        if !valid {
+            return None;
+        }
+        // Without branches, for which axis it is cannot be foreseen.
+        let not_x = usize::from(mx != largest);
+        let z = not_x + (not_x & usize::from(my != largest));
+        // Not by glam's index, which branches.
+        let negative = ray.direction.as_ref()[z].is_sign_negative();
+        let axes = &SHEAR_AXES[2 * z + usize::from(negative)];
+        let (scale, unscale) = if (pow2(-23)..pow2(24)).contains(&largest) {
+            return Some(Self {
+                ray,
+                axes,
+                scale: 1.0,
+                unscale: 1.0,
+            });
+        } else {
+            scale_ray(ray, largest, scaled)
+        };
+        Some(Self {
+            ray: scaled,
+            axes,
+            scale,
+            unscale,
+        })
+    }
+
+    /// Room for [`PreparedRay::new`].
+    pub(crate) const ROOM: Ray = Ray {
+        origin: glam::Vec3::ZERO,
+        direction: glam::Vec3::ZERO,
+        t_min: 0.0,
+        t_max: 0.0,
+    };
+
+    /// The reciprocals of the direction, by axis.
+    #[inline(always)]
+    pub(crate) fn reciprocals<T: Simd>(&self, token: T) -> [T::F32x8; 3] {
+        let [x, y, z]: [T::F32x8; 3] = splat3(token, self.ray.direction.to_array());
+        [
+            reciprocal(token, x),
+            reciprocal(token, y),
+            reciprocal(token, z),
+        ]
+    }
+
+    /// The caller's `t` as a scaled one.
+    #[inline(always)]
+    pub(crate) fn scaled(&self, t: f32) -> f32 {
+        t * self.scale
+    }
+
+    /// A scaled `t` that was accepted as the caller's: finite and within `ray`'s range, should the
+    /// scale take it out of what a float can hold.
+    #[inline(always)]
+    pub(crate) fn unscaled(&self, t: f32, ray: &Ray) -> f32 {
+        (t * self.unscale)
+            .min(f32::MAX)
+            .max(ray.t_min)
+            .min(ray.t_max)
+    }
+}
+
+/// Whether origin and direction are.
+#[inline(always)]
+fn is_finite(ray: &Ray) -> bool {
+    // 0 times a finite number is 0, times any other NaN. The last two lanes are the range of t.
+    let lanes: &[f32; 8] = bytemuck::cast_ref(ray);
+    let zero = wide::f32x8::splat(0.0);
+    let zeros = wide::f32x8::load(Portable, lanes) * zero;
+    Vector::<8>::bits(Vector::<8>::le(zeros, zero)) & 0b11_1111 == 0b11_1111
+}
+
+/// Writes `ray` with its direction scaled so that the largest component is in [1, 2), or as near as powers
+/// of two get. What `t` was multiplied by, and its inverse.
+#[cold]
+#[inline(never)]
+fn scale_ray(ray: &Ray, largest: f32, scaled: &mut Ray) -> (f32, f32) {
+    let exponent = largest.to_bits() >> 23;
+    // 2^-e for a component of exponent e, kept to powers whose inverse is a normal number too.
+    let inverse_exponent = 254u32.saturating_sub(exponent).clamp(1, 253);
+    let unscale = f32::from_bits(inverse_exponent << 23);
+    let scale = f32::from_bits((254 - inverse_exponent) << 23);
+    *scaled = Ray {
+        origin: ray.origin,
+        direction: ray.direction * unscale,
+        t_min: ray.t_min * scale,
+        t_max: ray.t_max * scale,
+    };
+    (scale, unscale)
+}
+
+/// The axes of the shear by the axis of the largest direction component, and whether it is negative.
+static SHEAR_AXES: [[usize; 3]; 6] = [
+    [1, 2, 0],
+    [2, 1, 0],
+    [2, 0, 1],
+    [0, 2, 1],
+    [0, 1, 2],
+    [1, 0, 2],
+];
+
+/// The greater of two numbers, neither of them NaN.
+#[inline(always)]
+pub(crate) fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// 2 to the power `exponent`, which is within -126 to 127.
+pub(crate) const fn pow2(exponent: i32) -> f32 {
+    f32::from_bits(((exponent + 127) as u32) << 23)
+}
