@@ -86,15 +86,9 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
         t_min,
         t_max,
     } = *ray.ray;
-    // Cut off at 2^48, for directions that are zero, or next to it.
-    let reciprocal = direction
-        .to_array()
-        .map(|d| (1.0 / d).clamp(-pow2(48), pow2(48)));
+    let reciprocal = 1.0 / direction[kz];
     let [a, b, c] = corners.map(|corner| corner - origin);
-    let shear = [
-        direction[kx] * reciprocal[kz],
-        direction[ky] * reciprocal[kz],
-    ];
+    let shear = [direction[kx] * reciprocal, direction[ky] * reciprocal];
     let shear = |p: Vec3| [p[kx] - shear[0] * p[kz], p[ky] - shear[1] * p[kz]];
     let ([ax, ay], [bx, by], [cx, cy]) = (shear(a), shear(b), shear(c));
 
@@ -113,7 +107,7 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     }
     let exact = [(wb / determinant) as f32, (wc / determinant) as f32];
 
-    // The weights of `f32`, where nothing in them vanishes, overflows or gets near to either.
+    // The weights of `f32`, where they are well-conditioned, and nothing vanishes, overflows or gets near to either.
     let cross32 = |px: f32, py: f32, qx: f32, qy: f32| px * qy - py * qx;
     let [wa, wb, wc] = [
         cross32(cx, cy, bx, by),
@@ -122,7 +116,14 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     ];
     let determinant = wa + wb + wc;
     let size = determinant.abs();
-    let ordinary = wa != 0.0 && wb != 0.0 && wc != 0.0 && size > pow2(-100) && size < pow2(126);
+    let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
+    let extent_y = ay.abs().max(by.abs()).max(cy.abs());
+    let ordinary = wa != 0.0
+        && wb != 0.0
+        && wc != 0.0
+        && size > pow2(-100)
+        && size < pow2(126)
+        && extent_x * extent_y <= size * 8.0;
     let [u, v] = if ordinary {
         [wb / determinant, wc / determinant]
     } else {
@@ -130,22 +131,6 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     };
 
     let z = a[kz] + u * (b[kz] - a[kz]) + v * (c[kz] - a[kz]);
-    let t = z * reciprocal[kz];
-    if !t.is_finite() {
-        return None;
-    }
-
-    // Into the interval in which the ray meets the triangle's own box.
-    let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-    let largest = lo.abs().max(hi.abs()).max_element().max(pow2(-70));
-    let error = 12.0 * pow2(-24) * largest;
-    let (mut near, mut far) = (f32::NEG_INFINITY, f32::INFINITY);
-    for axis in 0..3 {
-        let r = reciprocal[axis];
-        let e = error * r.abs();
-        near = near.max((lo[axis] * r).min(hi[axis] * r) - e);
-        far = far.min((lo[axis] * r).max(hi[axis] * r) + e);
-    }
-    let t = t.max(near).min(far) + 0.0;
+    let t = z * reciprocal + 0.0;
     (t.is_finite() && t_min <= t && t <= t_max).then_some([t, u + 0.0, v + 0.0])
 }

@@ -55,6 +55,16 @@ impl Child {
         self.0 & Self::LEAF != 0
     }
 
+    #[inline(always)]
+    pub(crate) const fn to_bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline(always)]
+    pub(crate) const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
     /// The place it leads to, if it is not empty.
     #[inline(always)]
     pub(crate) const fn index(self) -> usize {

@@ -85,11 +85,8 @@ impl TriangleLeaf {
             self.corners_of(vertices.y),
             self.lanes(),
         )?;
-        let [x, y, z] = vertices.relative;
-        let ([ax, bx, cx], [ay, by, cy], [az, bz, cz]) =
-            (self.corners_of(x), self.corners_of(y), self.corners_of(z));
-        let corners = [[ax, ay, az], [bx, by, bz], [cx, cy, cz]];
-        ray.hit(token, crossed, corners, T::F32x8::splat(token, t_max))
+        let z = self.corners_of(vertices.z);
+        ray.hit(token, crossed, z, T::F32x8::splat(token, t_max))
     }
 
     /// A number of each vertex as that of each triangle's first, second and third corner.

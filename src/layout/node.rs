@@ -39,6 +39,9 @@ pub trait WideNode: Pod + Sealed {
     ) -> Self::Slabs<S>;
     #[doc(hidden)]
     fn splat<S: Simd>(token: S, x: f32) -> Self::Lanes<S>;
+    /// By how much the greatest `t` is to be raised for [`test`](Self::test).
+    #[doc(hidden)]
+    fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32;
     /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
     #[doc(hidden)]
     fn test<S: Simd>(
@@ -47,9 +50,8 @@ pub trait WideNode: Pod + Sealed {
         slabs: &Self::Slabs<S>,
         t_max: Self::Lanes<S>,
     ) -> (u32, Self::Lanes<S>);
-    /// One lane of many.
     #[doc(hidden)]
-    fn lane<S: Simd>(lanes: &Self::Lanes<S>, lane: usize) -> f32;
+    fn lanes<S: Simd>(lanes: &Self::Lanes<S>) -> impl AsRef<[f32]>;
 }
 
 mod sealed {
@@ -129,6 +131,11 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
+            fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32 {
+                slabs.margin()
+            }
+
+            #[inline(always)]
             fn test<S: Simd>(
                 &self,
                 token: S,
@@ -139,8 +146,8 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn lane<S: Simd>(lanes: &Self::Lanes<S>, lane: usize) -> f32 {
-                lanes.to_array()[lane & ($width - 1)]
+            fn lanes<S: Simd>(lanes: &Self::Lanes<S>) -> impl AsRef<[f32]> {
+                lanes.to_array()
             }
         }
     };

@@ -8,16 +8,14 @@
 //!   monotone, so the rounded products compare as the exact ones do or come out equal. A lane that comes out
 //!   zero, or overflows, is worked out again in `f64`, where the products are exact. So the sign is exact,
 //!   and the sheared mesh has no crack at an edge or a vertex.
-//! - `t` is put into the interval where the ray meets the triangle's own box (see [`slab`](crate::slab)):
-//!   on a needle seen edge-on the weights, and so `t`, are ill-conditioned, but never worse than the geometry.
-//!
-//! A triangle with two corners at one place has an edge function that is exactly zero and two that are
-//! opposite, so it is never hit.
+//! - The weights, too, come from `f64` where those of `f32` would be ill-conditioned: on needles, and on
+//!   triangles seen nearly edge-on. So the error of `t` is bounded whatever the triangle (see
+//!   [`slab`](crate::slab)).
 
 use crate::{
     geometry::Ray,
     simd::Vector,
-    slab::{PreparedRay, pow2, primitive_interval},
+    slab::{CONDITION, PreparedRay, pow2},
 };
 
 /// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
@@ -31,14 +29,13 @@ pub(crate) struct RayShear<'a, V> {
     reciprocal: [V; 3],
 }
 
-/// Vertices, one a lane, as the ray sees them.
+/// Vertices, one a lane, as the ray sees them: less its origin, along the axes of the shear, and sheared.
 #[derive(Clone, Copy)]
 pub struct Sheared<V> {
-    /// Less the ray's origin, along the axes of the shear.
-    pub relative: [V; 3],
-    /// x and y after the shear.
     pub x: V,
     pub y: V,
+    /// Not scaled: the distance along the axis of the shear.
+    pub z: V,
 }
 
 /// Triangles, one a lane, that the line of the ray goes through.
@@ -93,9 +90,9 @@ impl<'a, V> RayShear<'a, V> {
         let shear_x = V::splat(token, direction[kx]) * self.reciprocal[kz];
         let shear_y = V::splat(token, direction[ky]) * self.reciprocal[kz];
         Sheared {
-            relative: [x, y, z],
             x: x - shear_x * z,
             y: y - shear_y * z,
+            z,
         }
     }
 
@@ -125,9 +122,13 @@ impl<'a, V> RayShear<'a, V> {
             return None;
         }
 
+        let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
+        let extent_y = ay.abs().max(by.abs()).max(cy.abs());
+        let size = determinant.abs();
         let certain = (zero.lt(least) | most.lt(zero))
             & finite
-            & V::splat(token, MIN_DETERMINANT).lt(determinant.abs());
+            & V::splat(token, MIN_DETERMINANT).lt(size)
+            & (extent_x * extent_y).le(size * V::splat(token, CONDITION));
         let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
         if mask != candidates {
@@ -140,40 +141,25 @@ impl<'a, V> RayShear<'a, V> {
     }
 
     /// The second half: where the crossed triangles are hit, if that is within the ray's range up to
-    /// `t_max`. `corners` are what [`Sheared::relative`] says of the three corners.
+    /// `t_max`. `z` is [`Sheared::z`] of the three corners.
     #[inline(always)]
     pub(crate) fn hit<const N: usize>(
         &self,
         token: V::Token,
         Crossed { mask, u, v }: Crossed<V>,
-        corners: [[V; 3]; 3],
+        z: [V; 3],
         t_max: V,
     ) -> Option<TriangleHits<V>>
     where
         V: Vector<N>,
     {
         let zero = V::splat(token, 0.0);
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = corners;
-        let [kx, ky, kz] = *self.axes;
-        let reciprocal = [
-            self.reciprocal[kx],
-            self.reciprocal[ky],
-            self.reciprocal[kz],
-        ];
-        let t = (az + u * (bz - az) + v * (cz - az)) * reciprocal[2];
-        // Before `t` is moved, too, for that would hide a NaN on some backends.
-        let infinity = V::splat(token, f32::INFINITY);
-        let finite = t.abs().lt(infinity);
-        let (near, far) = primitive_interval(
-            token,
-            reciprocal,
-            [ax.min(bx).min(cx), ay.min(by).min(cy), az.min(bz).min(cz)],
-            [ax.max(bx).max(cx), ay.max(by).max(cy), az.max(bz).max(cz)],
-        );
-        // Adding 0 turns -0 into 0, whose sign `min` and `max` leave open.
-        let t = t.max(near).min(far) + zero;
-        let in_range =
-            V::splat(token, self.ray.t_min).le(t) & t.le(t_max) & finite & t.abs().lt(infinity);
+        let [a, b, c] = z;
+        // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
+        let t = (a + u * (b - a) + v * (c - a)) * self.reciprocal[self.axes[2]] + zero;
+        let in_range = V::splat(token, self.ray.t_min).le(t)
+            & t.le(t_max)
+            & t.abs().lt(V::splat(token, f32::INFINITY));
         let mask = mask & in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,

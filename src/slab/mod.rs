@@ -2,55 +2,64 @@
 //!
 //! # Why it never loses a hit
 //!
-//! Let u = 2^-24, o the ray's origin, d its direction (largest component in 2^-23 to 2^24), r its reciprocals, D the largest over the axes of |scene bound| + |o|. A box plane p is met at
+//! Let u = 2^-24, o the ray's origin, d its direction (largest component in 2^-23 to 2^24), r its reciprocals,
+//! D the largest over the axes of |scene bound| + |o|. A box plane p is met at
 //!
 //! ```text
 //! near = p·r + (-(o·r) - E),  far = p·r + (-(o·r) + E),  E = K_BOX·u·D·|r|
 //! ```
 //!
-//! and the box is passed when max(near, t_min) <= min(far, t_max). The triangle test ends by putting t
-//! into the interval [n, f] of the triangle's own box by one fixed formula:
+//! (for r < 0, the box's two planes change places, here and below) and the box is passed when
 //!
 //! ```text
-//! n = max over axes of ((lo - o)·r - e),  f = min over axes of ((hi - o)·r + e),
-//! e = K_PRIMITIVE·u·M·|r|
+//! max(near, t_min - S) <= min(far, t_max + S),  S = K_T·u·D·|r.z|
 //! ```
 //!
-//! with M the largest |vertex - o| of any axis (for r < 0, lo and hi change places, here as above).
+//! with z the axis of the largest direction component. Let M be the largest |vertex - o| of a triangle on
+//! any axis: M <= D(1 + u).
 //!
-//! *(1) n and f are in order, and a point of the ray that meets the triangle lies between.* The edge
-//! functions have exact signs, so an accepted triangle, sheared *as computed*, holds 0: weights w >= 0
-//! of sum 1 exist with Σ w·x' = 0 and Σ w·y' = 0 exactly. A sheared x' = fl(X - fl(s·Z)), where X and Z
-//! are rounded differences and s a product with a rounded reciprocal, is off from the exact shear by at most
-//! u·|X| (difference) + 4u·|Z| (difference, reciprocal, quotient, product; |s| <= 1) + u·(|X| + |Z|) (last
-//! difference) <= 7u·M. So at t* = Σ w·Z / d.z the ray is within 7u·M, on each axis, of the point
-//! Σ w·vertex of the triangle, and exactly there along z. Hence (lo - o) - 7u·M <= d·t* <= (hi - o) + 7u·M,
-//! and, multiplied by |r|: exact n - 7u·M·|r| <= t* <= exact f + 7u·M·|r| on each axis. Computing
-//! (lo - o)·r - e adds at most u·M·|r| each for the difference, the reciprocal, the product and the last
-//! difference. 7 + 4 = 11, and second-order terms are far below 1: **K_PRIMITIVE = 12** gives
-//! n <= t* <= f on every pair of axes.
+//! *(1) An accepted triangle has a point near the ray.* The edge functions have exact signs, so the triangle,
+//! sheared *as computed*, holds 0: weights w >= 0 of sum 1 exist with Σ w·x' = 0 and Σ w·y' = 0 exactly. A
+//! sheared x' = fl(X - fl(s·Z)), where X and Z are rounded differences and s a product with a rounded
+//! reciprocal, is off from the exact shear by at most u·|X| (difference) + 4u·|Z| (difference, reciprocal,
+//! quotient, product; |s| <= 1) + u·(|X| + |Z|) (last difference) <= 7u·M. So at t* = Σ w·Z / d.z the ray is
+//! within 7u·M, on each axis, of the point P = Σ w·vertex of the triangle, and exactly there along z.
 //!
-//! *(2) The same where r was cut off* at R = 2^48, that is |d| < 1/R: multiplied by R, the inequality reads
-//! (lo - o)·R <= d·R·t* + 7u·M·R with |d·R| <= 1, so |t*| has to fit in what is left of K_PRIMITIVE,
-//! 12 - 7 - 3 > 1 u·M·R = 2^24·M. And |t*| <= M / |d.z| <= 2^23·M, for d.z, the
-//! largest component, is at least 2^-23. This is why R is not smaller.
+//! *(2) Every box that holds P is open at t\*.* Let lo <= P <= hi on an axis. Then
+//! lo - o - 7u·D <= d·t* <= hi - o + 7u·D, and, multiplied by |r|, exact near - 7u·D·|r| <= t* <=
+//! exact far + 7u·D·|r|. Computing near, with or without a fused operation, adds at most u·D·|r| (reciprocal),
+//! u·|p·r| + u·|o·r| <= u·D·|r| (products), u·(|o·r| + E) (constant) and u·(D·|r| + E) (sum): 4u·D·|r| + 2u·E.
+//! 7 + 4 = 11, and D and E are themselves rounded: **K_BOX = 14** gives near <= t* <= far on every axis.
 //!
-//! *(3) near(box) <= n <= t and t <= f <= far(box) for each box above.* Bounds of a box are no tighter
-//! than the triangle's, and each formula is monotone in the plane, rounding included, so it is enough
-//! to compare the two formulas on one plane. near, with or without a fused operation, is off by at most
-//! u·|p·r| + u·|o·r| (products), u·(|o·r| + E) (constant), u·(D·|r| + E) (sum) <= 3u·D·|r| + 2u·E from
-//! p·r - o·r - E; n by 3u·M·|r| + u·e from its own value with e, as counted in (1) without the
-//! reciprocal, which both share. M <= D(1 + u). So E - e >= 6u·D·|r| is enough: 12 + 6, and 2 more for
-//! the rounding of D, M, E and e themselves: **K_BOX = 20**.
+//! *(3) The same where r was cut off* at R = 2^48, that is |d| < 1/R: multiplied by R, the inequality reads
+//! (lo - o)·R <= d·R·t* + 7u·D·R with |d·R| <= 1, so |t*| has to fit in what is left of K_BOX,
+//! 14 - 7 - 4 > 2 u·D·R = 2^25·D. And |t*| <= M / |d.z| < 2^24·D, for d.z, the largest component, is at least 2^-23.
+//! This is why R is not smaller.
 //!
-//! *(4) Nothing overflows or turns NaN.* For D < 2^77, |p·r| and |o·r| are below 2^125. Beyond, far from
+//! *(4) The computed t is within S of t\*.* It is Z.a + v·(Z.b - Z.a) + w·(Z.c - Z.a), times r.z, of computed
+//! weights. Those of `f64` are good to 2^-50 and then rounded. Those of `f32` are only used where
+//! X·Y <= C·|det|, X and Y being the largest |x'| and |y'|: an edge function is off by 2u·X·Y + u·itself, the
+//! determinant by 6u·X·Y + 3u·itself, a weight by (8C + 5)u. So the mean is off by 2·(8C + 5)u·2M for the
+//! weights, and less than 10u·M for its own operations: 298u·M for C = [`CONDITION`] = 8. The product adds
+//! 2u, as does t_max + S: **K_T = 304**.
+//!
+//! *The pass itself.* A hit that counts has t_min <= t <= t_max. By (4), t_min - S <= t* <= t_max + S; by (2),
+//! near <= t* <= far on each axis: t* is between the two sides of the test. It is enough that *some* box of
+//! each level holds P: boxes may hold parts of triangles.
+//!
+//! *(5) A caller's primitive* has no such t*. Its t is put into the interval [n, f] that the ray spends in the
+//! primitive's own box, by one fixed formula, n = (lo - o)·r - e and f = (hi - o)·r + e with
+//! e = K_PRIMITIVE·u·M·|r|. A box around it is no tighter, and each formula is monotone in the plane, rounding
+//! included, so it is enough to compare the two on one plane: near is off from p·r - o·r - E by 3u·D·|r| + 2u·E, n
+//! from its own by 3u·M·|r| + u·e. So near <= n if K_BOX - K_PRIMITIVE >= 6 and some: **K_PRIMITIVE = 6**. No
+//! more is needed: that n <= f, where it does not hold, is part of the definition of a miss.
+//!
+//! *(6) Nothing overflows or turns NaN.* For D < 2^77, |p·r| and |o·r| are below 2^125. Beyond, far from
 //! any scene that floats can describe, the slabs are opened so wide that every box is passed: slow, and
 //! right. Below, D and M are never taken as less than 2^-70, which covers the absolute error of
 //! results that are denormal, or flushed to zero by a program that has asked for it.
 //!
-//! The pass itself follows: t_min <= t <= t_max for a hit that counts, near <= t on each axis and
-//! t <= far on each, so max(near, t_min) <= t <= min(far, t_max). An empty lane (lo = ∞, hi = -∞) has
-//! near = ∞ and is never passed.
+//! An empty lane (lo = ∞, hi = -∞) has near = ∞ and is never passed.
 //!
 //! The known ways are Williams et al., "An Efficient and Robust Ray-Box Intersection Algorithm" (2005),
 //! and Ize, "Robust BVH Ray Traversal" (2013), which widens far by two ULPs; they cover the rounding
@@ -68,12 +77,16 @@ use crate::{
 /// Half the distance from 1 to the next float: the relative error of one rounding.
 const UNIT_ROUNDOFF: f32 = pow2(-24);
 /// Margin of the box test: derived above.
-const K_BOX: f32 = 20.0;
+const K_BOX: f32 = 14.0;
+/// Margin of the computed `t` of a triangle: derived above.
+const K_T: f32 = 304.0;
 /// Margin of a primitive's own interval: derived above.
-const K_PRIMITIVE: f32 = 12.0;
-/// No distance is taken to be smaller when errors are estimated: (4) above.
+const K_PRIMITIVE: f32 = 6.0;
+/// How ill-conditioned a triangle's weights may be in `f32`: (4) above.
+pub(crate) const CONDITION: f32 = 8.0;
+/// No distance is taken to be smaller when errors are estimated: (6) above.
 const MIN_EXTENT: f32 = pow2(-70);
-/// Up to here nothing overflows: (4) above.
+/// Up to here nothing overflows: (6) above.
 const MAX_EXTENT: f32 = pow2(77);
 
 /// What the box test needs of a ray and a scene, in every lane: 9 vectors, kept in registers.
@@ -82,7 +95,9 @@ pub struct RaySlabs<const N: usize, V> {
     reciprocal: [V; 3],
     near: [V; 3],
     far: [V; 3],
+    /// The least `t`, less [`margin`](Self::margin).
     t_min: V,
+    margin: V,
     /// 1 where the direction is negative: which of a box's two planes is met first.
     negative: [usize; 3],
 }
@@ -104,12 +119,19 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
             extent = extent.max(lo[axis].abs().max(hi[axis].abs()) + origin[axis].abs());
         }
         let error = extent * V::splat(token, K_BOX * UNIT_ROUNDOFF);
+        let [rx, ry, rz] = [
+            reciprocal[0].abs(),
+            reciprocal[1].abs(),
+            reciprocal[2].abs(),
+        ];
+        let margin = extent * V::splat(token, K_T * UNIT_ROUNDOFF) * rx.min(ry).min(rz);
         let zero = V::splat(token, 0.0);
         let mut slabs = Self {
             reciprocal,
             near: [zero; 3],
             far: [zero; 3],
-            t_min: V::splat(token, ray.t_min),
+            t_min: V::splat(token, ray.t_min) - margin,
+            margin,
             negative: [
                 (ray.direction.x.to_bits() >> 31) as usize,
                 (ray.direction.y.to_bits() >> 31) as usize,
@@ -128,6 +150,12 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         slabs
     }
 
+    /// How far the computed `t` of a triangle may be off: what the greatest `t` has to be raised by.
+    #[inline(always)]
+    pub(crate) fn margin(&self) -> f32 {
+        self.margin.to_array()[0]
+    }
+
     /// Has every box passed but the empty one.
     #[cold]
     #[inline(never)]
@@ -140,7 +168,8 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         }
     }
 
-    /// Which of the boxes the ray may meet up to `t_max`, a bit each, and from which `t` on.
+    /// Which of the boxes the ray may meet up to `t_max`, raised by the margin: a bit each, and from which
+    /// `t` on.
     #[inline(always)]
     pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (u32, V) {
         let (near_x, far_x) = self.axis(token, planes, 0);
@@ -162,7 +191,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
     }
 }
 
-/// The interval of `t` within which a primitive's own bounds are met, for the hit to be put into: (1) above.
+/// The interval of `t` within which a primitive's own bounds are met, for the hit to be put into: (5) above.
 /// `reciprocal` is the ray's; `lo` and `hi` are the bounds less the ray's origin, axis by axis in the same order.
 ///
 /// One fixed formula, so that every backend finds the same bits.

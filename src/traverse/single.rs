@@ -21,12 +21,31 @@ pub(crate) trait Visitor<L> {
     fn leaf(&mut self, leaf: &L) -> ControlFlow<(), f32>;
 }
 
-/// A child to come back to, and the `t` from which on the ray is in its box.
-#[derive(Clone, Copy)]
-struct Entry {
-    near: f32,
-    child: Child,
+/// A child to come back to, and the `t` from which on the ray is in its box: the bits of `t` above those
+/// of the child, so that entries compare as their `t` do. Negative ones come first, though not in order among
+/// themselves, which costs time where a ray has a negative range, and nothing else.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry(i64);
+
+impl Entry {
+    #[inline(always)]
+    fn new(near: f32, child: Child) -> Self {
+        Self(i64::from(near.to_bits()) << 32 | i64::from(child.to_bits()))
+    }
+
+    #[inline(always)]
+    fn near(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    #[inline(always)]
+    fn child(self) -> Child {
+        Child::from_bits(self.0 as u32)
+    }
 }
+
+/// The children left behind: those below `len` were written, the next one last.
+type Stack = [MaybeUninit<Entry>; STACK];
 
 /// Takes `visitor` to every leaf whose box the ray passes within its range, which shrinks on the way. The ray is a
 /// prepared one's, and so are the reciprocals of its direction.
@@ -43,83 +62,108 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
     }
     let (nodes, leaves) = (bvh.nodes(), bvh.leaves());
     let slabs = N::slabs(token, ray, reciprocal, bvh.bounds());
-    let mut t_max = ray.t_max;
-    let mut stack = [MaybeUninit::<Entry>::uninit(); STACK];
+    let margin = N::margin(&slabs);
+    let mut t_max = ray.t_max + margin;
+    // Apart, so that the length stays in a register and nothing is cleared.
+    let mut stack: Stack = [MaybeUninit::uninit(); STACK];
     let mut len = 0;
     let mut current = bvh.root();
     loop {
-        if current.is_leaf() {
-            // SAFETY: the layout's check saw that all leaves led to are there.
-            let leaf = unsafe { leaves.get_unchecked(current.index()) };
-            match visitor.leaf(leaf) {
-                ControlFlow::Break(()) => return,
-                ControlFlow::Continue(t) => t_max = t,
-            }
-        } else {
+        while !current.is_leaf() {
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
             let node = unsafe { nodes.get_unchecked(current.index()) };
             let (mut mask, near) = node.test(token, &slabs, N::splat(token, t_max));
-            // SAFETY: `mask` has bits for the node's lanes alone.
-            let child = |lane: u32| unsafe { *node.children().get_unchecked(lane as usize) };
-            if mask != 0 {
-                let first = mask.trailing_zeros();
-                mask &= mask - 1;
-                current = child(first);
-                if mask == 0 {
-                    continue;
-                }
-                // Insertion from the top of the stack down, the nearest left in hand.
-                let base = len;
-                let mut best = N::lane(&near, first as usize);
-                while mask != 0 {
-                    let lane = mask.trailing_zeros();
-                    mask &= mask - 1;
-                    let mut entry = Entry {
-                        near: N::lane(&near, lane as usize),
-                        child: child(lane),
-                    };
-                    if V::NEAREST_FIRST && entry.near < best {
-                        (entry, current, best) = (
-                            Entry {
-                                near: best,
-                                child: current,
-                            },
-                            entry.child,
-                            entry.near,
-                        );
-                    }
-                    let mut place = len;
-                    // SAFETY: the layout's check saw that a walk never has more than `STACK`
-                    // entries; those below `len` were written.
-                    unsafe {
-                        while V::NEAREST_FIRST && place > base {
-                            let below = stack.get_unchecked(place - 1).assume_init();
-                            if below.near >= entry.near {
-                                break;
-                            }
-                            *stack.get_unchecked_mut(place) = MaybeUninit::new(below);
-                            place -= 1;
-                        }
-                        *stack.get_unchecked_mut(place) = MaybeUninit::new(entry);
-                    }
-                    len += 1;
+            if mask == 0 {
+                match pop(&stack, &mut len, t_max) {
+                    Some(child) => current = child,
+                    None => return,
                 }
                 continue;
             }
+            let first = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            // SAFETY: `mask` has bits for the node's lanes alone.
+            current = unsafe { *node.children().get_unchecked(first) };
+            if mask == 0 {
+                continue;
+            }
+            let near = N::lanes(&near);
+            // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
+            let entry = |lane: usize| unsafe {
+                let child = *node.children().get_unchecked(lane);
+                Entry::new(*near.as_ref().get_unchecked(lane), child)
+            };
+            let mut nearest = entry(first);
+            let base = len;
+            loop {
+                let other = entry(mask.trailing_zeros() as usize);
+                mask &= mask - 1;
+                let farther = if V::NEAREST_FIRST {
+                    let farther = nearest.max(other);
+                    nearest = nearest.min(other);
+                    farther
+                } else {
+                    other
+                };
+                // SAFETY: the layout's check saw that a walk never leaves more than `STACK`
+                // children behind.
+                unsafe { stack.get_unchecked_mut(len).write(farther) };
+                len += 1;
+                if mask == 0 {
+                    break;
+                }
+            }
+            if V::NEAREST_FIRST {
+                // SAFETY: these were just written.
+                unsafe { sort(stack.get_unchecked_mut(base..len)) };
+            }
+            current = nearest.child();
         }
-        // Back to the last child left behind that is still near enough.
-        loop {
-            if len == 0 {
-                return;
+
+        // SAFETY: the layout's check saw that all leaves led to are there.
+        let leaf = unsafe { leaves.get_unchecked(current.index()) };
+        match visitor.leaf(leaf) {
+            ControlFlow::Break(()) => return,
+            ControlFlow::Continue(t) => t_max = t + margin,
+        }
+        match pop(&stack, &mut len, t_max) {
+            Some(child) => current = child,
+            None => return,
+        }
+    }
+}
+
+/// The last child left behind that is still near enough.
+#[inline(always)]
+fn pop(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Child> {
+    while *len > 0 {
+        *len -= 1;
+        // SAFETY: those below the length were written.
+        let entry = unsafe { stack.get_unchecked(*len).assume_init() };
+        if entry.near() <= t_max {
+            return Some(entry.child());
+        }
+    }
+    None
+}
+
+/// Sorts a few entries, the nearest last.
+///
+/// # Safety
+/// All were written.
+#[inline(always)]
+unsafe fn sort(entries: &mut [MaybeUninit<Entry>]) {
+    for sorted in 1..entries.len() {
+        // SAFETY: the caller's promise; `place` is at most `sorted`.
+        unsafe {
+            let entry = entries.get_unchecked(sorted).assume_init();
+            let mut place = sorted;
+            while place > 0 && entries.get_unchecked(place - 1).assume_init() < entry {
+                *entries.get_unchecked_mut(place) = *entries.get_unchecked(place - 1);
+                place -= 1;
             }
-            len -= 1;
-            // SAFETY: entries below `len` were written.
-            let entry = unsafe { stack.get_unchecked(len).assume_init() };
-            if entry.near <= t_max {
-                current = entry.child;
-                break;
-            }
+            entries.get_unchecked_mut(place).write(entry);
         }
     }
 }
