@@ -66,12 +66,15 @@ fn triangle(c: &mut Criterion) {
     let mut group = c.benchmark_group("triangle test");
     group.throughput(Throughput::Elements((leaves.len() * rays.len()) as u64));
     for backend in Backend::available() {
-        group.bench_function(BenchmarkId::new("ray against a leaf", backend.name()), |b| {
-            b.iter(|| -> u32 {
-                let hits = |ray| sweep::count_triangles(backend, black_box(&leaves), ray);
-                rays.iter().map(hits).sum()
-            });
-        });
+        group.bench_function(
+            BenchmarkId::new("ray against a leaf", backend.name()),
+            |b| {
+                b.iter(|| -> u32 {
+                    let hits = |ray| sweep::count_triangles(backend, black_box(&leaves), ray);
+                    rays.iter().map(hits).sum()
+                });
+            },
+        );
     }
 }
 
@@ -111,7 +114,9 @@ fn build(c: &mut Criterion) {
     group.sample_size(10);
     group.throughput(Throughput::Elements(mesh.len() as u64));
     group.bench_function("8 wide", |b| b.iter(|| Builder::new().build(&mesh)));
-    group.bench_function("4 wide", |b| b.iter(|| Builder::new().build_as::<Node4>(&mesh)));
+    group.bench_function("4 wide", |b| {
+        b.iter(|| Builder::new().build_as::<Node4>(&mesh))
+    });
 }
 
 criterion_group!(benches, slab, triangle, traversal, build);

@@ -1,14 +1,14 @@
-//! From a caller's binary tree to one as the builder makes them: see `Collapse::new`.
+//! From a caller's binary tree to one in our order, of single primitives.
 
 use super::{
     BuildError,
     binary::{BinaryNode, BinaryTree},
     binned,
     input::Input,
-    refs::{Bounds, Ref, Refs},
+    lay_out::{Part, lay_out},
+    refs::{Ref, Refs},
 };
-use crate::geometry::{Aabb, TriangleMesh};
-use bytemuck::Zeroable;
+use crate::geometry::TriangleMesh;
 use std::{vec, vec::Vec};
 
 /// `tree` without the primitives that are not in `refs`, its leaves split down to single primitives, its boxes made of theirs.
@@ -32,74 +32,30 @@ pub(super) fn adopt<I: Input>(
         return Ok(BinaryTree::default());
     }
 
-    let mut nodes = vec![BinaryNode::zeroed(); 2 * total - 1];
     let mut order = Vec::with_capacity(total);
-    let mut kept = Vec::new();
-    // A node of `tree`, where it goes, and where those below it go.
-    let mut todo = vec![(0, 0, 1)];
-    while let Some((mut index, slot, at)) = todo.pop() {
+    let nodes = lay_out(total, 0, |mut index, below| {
         // Past nodes of which one side is left.
-        let node = loop {
-            let node = &tree.nodes()[index];
-            if node.is_leaf() {
-                break node;
-            }
-            let [left, right] = node.children();
+        while !tree.nodes()[index].is_leaf() {
+            let [left, right] = tree.nodes()[index].children();
             index = match (counts[left], counts[right]) {
                 (0, _) => right,
                 (_, 0) => left,
-                _ => break node,
+                (left_leaves, _) => {
+                    return Part::Inner {
+                        left,
+                        right,
+                        left_leaves,
+                    };
+                }
             };
-        };
-        if !node.is_leaf() {
-            let [left, right] = node.children();
-            nodes[slot] = inner(at);
-            let left_at = at + 2;
-            let right_at = left_at + 2 * counts[left] - 2;
-            todo.extend([(right, at + 1, right_at), (left, at, left_at)]);
-            continue;
         }
-        kept.clear();
-        kept.extend(listed(tree, node).filter_map(|&id| places.of(&refs.refs, id)));
-        let centers = kept
-            .iter()
-            .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()));
-        let (above, below) = nodes.split_at_mut(at);
-        let below = &mut below[..2 * kept.len() - 2];
-        let first = order.len() as u32;
-        binned::subtree(
-            input,
-            &mut kept,
-            centers,
-            first,
-            &mut above[slot],
-            below,
-            at as u32,
-            0,
-        );
+        let leaf = listed(tree, &tree.nodes()[index]);
+        let mut kept: Vec<_> = leaf.filter_map(|&id| places.of(&refs.refs, id)).collect();
+        let subtree = binned::subtree(input, &mut kept, order.len(), below);
         order.extend(kept.iter().map(Ref::id));
-    }
-    refit(&mut nodes);
+        Part::Tree(subtree)
+    });
     Ok(BinaryTree::new_unchecked(nodes, order))
-}
-
-/// A node whose children are at `at`, its box not yet known.
-pub(super) fn inner(at: usize) -> BinaryNode {
-    BinaryNode {
-        aabb: Aabb::EMPTY,
-        first: at as u32,
-        count: 0,
-    }
-}
-
-/// Makes boxes anew from the leaves'. Every node comes before those below it.
-pub(super) fn refit(nodes: &mut [BinaryNode]) {
-    for index in (0..nodes.len()).rev() {
-        if !nodes[index].is_leaf() {
-            let [left, right] = nodes[index].children();
-            nodes[index].aabb = nodes[left].aabb.join(nodes[right].aabb);
-        }
-    }
 }
 
 /// The primitives of a leaf.

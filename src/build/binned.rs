@@ -11,7 +11,6 @@ use super::{
     split::Cut,
     sweep,
 };
-use crate::geometry::Aabb;
 use bytemuck::Zeroable;
 use std::{vec, vec::Vec};
 
@@ -19,82 +18,116 @@ use std::{vec, vec::Vec};
 /// time, should each cut take off only little. Trees over scenes we know of are less than 50 deep.
 const MAX_DEPTH: u32 = 64;
 
-/// The tree over all of `refs`, one primitive a leaf, leaves in the order of the walk.
+/// The tree over all of `refs`, one primitive a leaf.
 pub(super) fn build<I: Input>(input: &I, refs: Refs) -> BinaryTree {
-    let Refs {
-        mut refs, centers, ..
-    } = refs;
+    let mut refs = refs.refs;
     if refs.is_empty() {
         return BinaryTree::default();
     }
-    let mut nodes = vec![BinaryNode::zeroed(); 2 * refs.len() - 1];
-    if let [root, below @ ..] = &mut nodes[..] {
-        subtree(input, &mut refs, centers, 0, root, below, 1, 0);
-    }
-    let order = refs.iter().map(Ref::id).collect::<Vec<_>>();
+    let nodes = subtree(input, &mut refs, 0, 1);
+    let order = refs.iter().map(Ref::id).collect();
     BinaryTree::new_unchecked(nodes, order)
 }
 
-/// The tree over `refs`, which are left in its order: its root, and the nodes below in `below`, whose
-/// place is `at`. The place of `refs` in the tree's order is `first`.
-#[expect(clippy::too_many_arguments, reason = "the state of a recursion")]
+/// The nodes of the tree over `refs`, of which there are some, and which are left in its order. Their places in the
+/// order begin at `first`, those of the nodes but the root at `below`.
 pub(super) fn subtree<I: Input>(
     input: &I,
     refs: &mut [Ref],
-    centers: Bounds,
-    first: u32,
-    root: &mut BinaryNode,
-    below: &mut [BinaryNode],
-    at: u32,
-    depth: u32,
-) {
-    if refs.len() <= sweep::MAX {
-        sweep::build(input, refs, first, root, below, at);
-        return;
+    first: usize,
+    below: usize,
+) -> Vec<BinaryNode> {
+    let centers = bounds_of_centers(refs);
+    let mut nodes = vec![BinaryNode::zeroed(); 2 * refs.len() - 1];
+    if let [root, nodes @ ..] = &mut nodes[..] {
+        Task {
+            input,
+            refs,
+            centers,
+            depth: 0,
+            root,
+            nodes,
+            first: first as u32,
+            below: below as u32,
+        }
+        .build();
     }
-    let (mid, left_centers, right_centers) = split(refs, &centers, depth);
-    let (left_refs, right_refs) = refs.split_at_mut(mid);
-    let [left, right, below @ ..] = below else {
-        return;
-    };
-    let (left_below, right_below) = below.split_at_mut(2 * left_refs.len() - 2);
-    let left_at = at + 2;
-    let right_at = left_at + left_below.len() as u32;
-    let right_first = first + mid as u32;
-    let worth_it = left_refs.len().min(right_refs.len()) > TASK;
-    let depth = depth + 1;
-    join(
-        worth_it,
-        || {
-            subtree(
-                input,
-                left_refs,
-                left_centers,
-                first,
-                left,
-                left_below,
-                left_at,
-                depth,
-            )
-        },
-        || {
-            subtree(
-                input,
-                right_refs,
-                right_centers,
-                right_first,
-                right,
-                right_below,
-                right_at,
-                depth,
-            )
-        },
-    );
-    *root = BinaryNode {
-        aabb: Aabb::join(left.aabb, right.aabb),
-        first: at,
-        count: 0,
-    };
+    nodes
+}
+
+/// A subtree that is to be built.
+struct Task<'a, I> {
+    input: &'a I,
+    refs: &'a mut [Ref],
+    /// The bounds of twice the references' centers.
+    centers: Bounds,
+    depth: u32,
+    root: &'a mut BinaryNode,
+    /// All nodes but the root.
+    nodes: &'a mut [BinaryNode],
+    /// The place of `refs[0]` in the tree's order.
+    first: u32,
+    /// The place of `nodes[0]` in the tree.
+    below: u32,
+}
+
+impl<I: Input> Task<'_, I> {
+    fn build(self) {
+        let Self {
+            input,
+            refs,
+            centers,
+            depth,
+            root,
+            nodes,
+            first,
+            below,
+        } = self;
+        if refs.len() <= sweep::MAX {
+            sweep::build(input, refs, first, root, nodes, below);
+            return;
+        }
+        let (mid, left_centers, right_centers) = split(refs, &centers, depth);
+        let (left_refs, right_refs) = refs.split_at_mut(mid);
+        let worth_it = left_refs.len().min(right_refs.len()) > TASK;
+        let [left_root, right_root, nodes @ ..] = nodes else {
+            return;
+        };
+        let (left_nodes, right_nodes) = nodes.split_at_mut(2 * mid - 2);
+        let below_left = below + 2;
+        let below_right = below_left + left_nodes.len() as u32;
+        let left = Task {
+            input,
+            refs: left_refs,
+            centers: left_centers,
+            depth: depth + 1,
+            root: &mut *left_root,
+            nodes: left_nodes,
+            first,
+            below: below_left,
+        };
+        let right = Task {
+            input,
+            refs: right_refs,
+            centers: right_centers,
+            depth: depth + 1,
+            root: &mut *right_root,
+            nodes: right_nodes,
+            first: first + mid as u32,
+            below: below_right,
+        };
+        join(worth_it, || left.build(), || right.build());
+        *root = BinaryNode {
+            aabb: left_root.aabb.join(right_root.aabb),
+            first: below,
+            count: 0,
+        };
+    }
+}
+
+fn bounds_of_centers(refs: &[Ref]) -> Bounds {
+    refs.iter()
+        .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()))
 }
 
 /// Sorts `refs`, of which there are some, into two sides, neither empty. Not inlined, to keep the bins off the recursion's frames.
@@ -120,10 +153,6 @@ fn split(refs: &mut [Ref], centers: &Bounds, depth: u32) -> (usize, Bounds, Boun
             a.total_cmp(&b).then(a_id.cmp(&b_id))
         });
     }
-    let centers = |refs: &[Ref]| {
-        refs.iter()
-            .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()))
-    };
     let (left, right) = refs.split_at(mid);
-    (mid, centers(left), centers(right))
+    (mid, bounds_of_centers(left), bounds_of_centers(right))
 }

@@ -3,10 +3,12 @@
 use super::{
     BinaryTree, BuildError, adopt, binned,
     collapse::Collapse,
-    emit::{self, Parts},
+    emit::{Parts, emit},
+    group::group,
     input::{Boxes, Input, Triangles},
-    rebalance,
+    rebalance::rebalance,
     refs::Refs,
+    reinsertion::{self, Effort},
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
@@ -142,7 +144,7 @@ impl Builder {
         input: &I,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
         let (tree, dropped) = self.binary(input)?;
-        collapse(input, tree, dropped)
+        wide(input, tree, dropped, Some(GROUPED))
     }
 
     fn wide_from<N: WideNode, I: Input>(
@@ -152,22 +154,38 @@ impl Builder {
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
         let refs = Refs::gather(input, self.drop_non_finite)?;
         let tree = adopt::adopt(input, tree, &refs)?;
-        collapse(input, tree, refs.dropped)
+        wide(input, tree, refs.dropped, None)
     }
 
     /// The binary tree, and how many primitives were left out of it for not being finite.
     fn binary<I: Input>(&self, input: &I) -> Result<(BinaryTree, usize), BuildError> {
         let refs = Refs::gather(input, self.drop_non_finite)?;
         let dropped = refs.dropped;
-        Ok((binned::build(input, refs), dropped))
+        let tree = binned::build(input, refs);
+        Ok((reinsertion::optimize(tree, SINGLE), dropped))
     }
 }
 
-/// The hierarchy from a tree as the builder makes them.
-fn collapse<N: WideNode, I: Input>(
+/// Of a tree of single primitives.
+const SINGLE: Effort = Effort {
+    rounds: 10,
+    share: 40,
+    least_gain: 1e-3,
+};
+
+/// Of a tree of leaves, of which there are a fourth.
+const GROUPED: Effort = Effort {
+    rounds: 30,
+    share: 5,
+    least_gain: 1e-3,
+};
+
+/// The hierarchy from a tree in our order.
+fn wide<N: WideNode, I: Input>(
     input: &I,
     tree: BinaryTree,
     dropped: usize,
+    effort: Option<Effort>,
 ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
     let Parts {
         nodes,
@@ -175,27 +193,31 @@ fn collapse<N: WideNode, I: Input>(
         primitives,
         bounds,
     } = match N::WIDTH {
-        4 => collapse_to::<N, I, 4>(input, tree),
-        _ => collapse_to::<N, I, 8>(input, tree),
+        4 => collapse::<N, I, 4>(input, &tree, effort),
+        _ => collapse::<N, I, 8>(input, &tree, effort),
     }?;
     let bvh = Bvh::from_parts(nodes, leaves, primitives, bounds)?;
     Ok(bvh.with_dropped(dropped as u32))
 }
 
-fn collapse_to<N: WideNode, I: Input, const W: usize>(
+fn collapse<N: WideNode, I: Input, const W: usize>(
     input: &I,
-    tree: BinaryTree,
+    tree: &BinaryTree,
+    effort: Option<Effort>,
 ) -> Result<Parts<N, I::Leaf>, LayoutError> {
-    let collapsed = Collapse::<W>::new(input, &tree);
-    let parts = emit::emit(input, &tree, &collapsed);
+    let mut tree = group(input, tree, &Collapse::<W>::new(input, tree));
+    if let Some(effort) = effort {
+        tree = reinsertion::optimize(tree, effort);
+    }
+    let parts = emit(input, &tree, &Collapse::<W>::new(input, &tree));
     let Err(LayoutError::TooDeep(_)) = parts else {
         return parts;
     };
     // A wide node takes up a binary level at least and leaves W - 1 children behind at most. So a tree
     // of no more levels than this fits the stack, however it is collapsed; and it has room for halving
-    // 2^30 primitives, whatever the width.
+    // 2^30 leaves, whatever the width.
     const { assert!((STACK - 1) / (W - 1) >= 30) };
     let levels = ((STACK - 1) / (W - 1)) as u32;
-    let tree = rebalance::rebalance(input, &tree, levels);
-    emit::emit(input, &tree, &Collapse::<W>::new(input, &tree))
+    tree = rebalance(&tree, levels);
+    emit(input, &tree, &Collapse::<W>::new(input, &tree))
 }

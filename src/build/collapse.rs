@@ -188,13 +188,13 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
     /// One node; those below it are in `entries`, of which the first is that of node `start`.
     #[inline(always)]
     fn solve(&self, node: usize, entries: &[Entry], start: usize) -> Entry {
-        let BinaryNode { aabb, first, .. } = self.tree.nodes()[node];
+        let BinaryNode { aabb, first, count } = self.tree.nodes()[node];
         let area = self.measure.half_area(&aabb);
         if self.tree.nodes()[node].is_leaf() {
             return Entry {
-                forest: [area * I::leaf_cost(1); _],
+                forest: [area * I::leaf_cost(count as usize); _],
                 first,
-                count: 1,
+                count: count as u8,
                 fits: true,
                 is_leaf: true,
             };

@@ -25,24 +25,20 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     tree: &BinaryTree,
     collapse: &Collapse<W>,
 ) -> Result<Parts<N, I::Leaf>, LayoutError> {
-    let Some(root) = tree.nodes().first() else {
-        return Ok(Parts {
-            nodes: Vec::new(),
-            leaves: Vec::new(),
-            primitives: Vec::new(),
-            bounds: Aabb::EMPTY,
-        });
-    };
-    let measure = Measure::of_bounds(&root.aabb);
+    let bounds = tree.nodes().first().map_or(Aabb::EMPTY, |root| root.aabb);
+    let measure = Measure::of_bounds(&bounds);
+    let area = |node: usize| measure.half_area(&tree.nodes()[node].aabb);
     let mut nodes = Vec::new();
     let mut leaves = Vec::new();
     // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
     let mut todo = Vec::new();
-    match collapse.leaf(0) {
-        Some(leaf) => leaves.push(leaf),
-        None => {
-            nodes.push(N::zeroed());
-            todo.push((0, 0, 0));
+    if !tree.nodes().is_empty() {
+        match collapse.leaf(0) {
+            Some(leaf) => leaves.push(leaf),
+            None => {
+                nodes.push(N::zeroed());
+                todo.push((0, 0, 0));
+            }
         }
     }
     while let Some((node, place, used)) = todo.pop() {
@@ -53,11 +49,8 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
             return Err(LayoutError::TooDeep(place));
         }
         // The likeliest first: its nodes follow, close by.
-        children.sort_by(|&a, &b| {
-            let area = |node: usize| measure.half_area(&tree.nodes()[node].aabb);
-            area(b).total_cmp(&area(a))
-        });
-        let below = todo.len();
+        children.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
+        let (known, first) = (todo.len(), nodes.len());
         let lanes = children.iter().map(|&child| {
             let link = match collapse.leaf(child) {
                 Some(leaf) => {
@@ -65,7 +58,7 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
                     Child::leaf(leaves.len() as u32 - 1)
                 }
                 None => {
-                    let place = nodes.len() + todo.len() - below;
+                    let place = first + todo.len() - known;
                     todo.push((child, place, used));
                     Child::node(place as u32)
                 }
@@ -74,33 +67,33 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
         });
         let wide = N::from_children(lanes);
         nodes[place] = wide;
-        nodes.resize(nodes.len() + todo.len() - below, N::zeroed());
-        todo[below..].reverse();
+        nodes.resize(first + todo.len() - known, N::zeroed());
+        todo[known..].reverse();
     }
     let (leaves, primitives) = fill(input, tree.order(), &leaves)?;
     Ok(Parts {
         nodes,
         leaves,
         primitives,
-        bounds: root.aabb,
+        bounds,
     })
 }
 
-/// Leaves from ranges of the tree's order, and the list of primitives that they count in.
+/// Leaves of ranges of the tree's order, and the list of primitives that they count in.
 fn fill<I: Input>(
     input: &I,
     order: &[u32],
     ranges: &[Range<usize>],
 ) -> Result<(Vec<I::Leaf>, Vec<u32>), LayoutError> {
     let mut primitives = Vec::with_capacity(order.len());
-    let mut firsts = Vec::with_capacity(ranges.len() + 1);
+    let mut ends = Vec::with_capacity(ranges.len() + 1);
+    ends.push(0);
     for range in ranges {
         let first = primitives.len();
-        firsts.push(first);
         primitives.extend_from_slice(&order[range.clone()]);
         primitives[first..].sort_unstable();
+        ends.push(primitives.len());
     }
-    firsts.push(primitives.len());
     let leaf = |(index, ends): (usize, &[usize])| {
         let leaf = input.leaf(&primitives[ends[0]..ends[1]], ends[0] as u32);
         leaf.ok_or(LayoutError::Leaf(index))
@@ -108,14 +101,11 @@ fn fill<I: Input>(
     #[cfg(feature = "rayon")]
     let leaves = {
         use rayon::prelude::*;
-        firsts
-            .par_windows(2)
-            .enumerate()
-            .map(leaf)
-            .collect::<Result<_, _>>()
+        let ends = ends.par_windows(2).enumerate();
+        ends.map(leaf).collect::<Result<_, _>>()
     };
     #[cfg(not(feature = "rayon"))]
-    let leaves = firsts
+    let leaves = ends
         .windows(2)
         .enumerate()
         .map(leaf)

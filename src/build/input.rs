@@ -26,6 +26,8 @@ pub(super) trait Input: Sync {
     type Leaf: Leaf + Send;
     /// The most primitives a leaf has.
     const MAX_LEAF: usize;
+    /// How many times the cost of two leaves one may have for which they are given up.
+    const JOINED: f32;
 
     /// How many there are.
     fn len(&self) -> usize;
@@ -66,6 +68,7 @@ fn triangle_aabb([a, b, c]: [Vec3; 3]) -> Aabb {
 impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
+    const JOINED: f32 = cost::TRIANGLES_JOINED;
 
     fn len(&self) -> usize {
         self.0.len()
@@ -154,6 +157,7 @@ pub(super) struct Boxes<'a>(pub &'a [Aabb]);
 impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
+    const JOINED: f32 = 1.0;
 
     fn len(&self) -> usize {
         self.0.len()

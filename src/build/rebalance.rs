@@ -1,82 +1,75 @@
 //! Trees too deep for a walk's stack, made shallow.
 
 use super::{
-    adopt::{inner, refit},
     binary::{BinaryNode, BinaryTree},
-    input::Input,
+    lay_out::{Part, lay_out},
 };
-use bytemuck::Zeroable;
+use core::ops::Range;
 use std::{vec, vec::Vec};
 
-/// What goes where in the new tree.
+/// What goes into the new tree, and how many nodes its leaves may be below.
 enum Task {
-    /// A node of the old tree.
-    Keep(usize),
-    /// A run of its leaves, in its order, halved down to single ones.
-    Halve { first: usize, count: usize },
+    /// A node of the old one.
+    Keep { node: usize, levels: u32 },
+    /// A run of leaves, halved down to single ones.
+    Halve(Range<usize>),
 }
 
-/// The same leaves in the same order, none below more than `levels` other nodes, which must be as many as halves
-/// need: the binary logarithm of the leaves' number. Subtrees that are shallow enough stay as they are.
-///
-/// `tree` is as the builder makes them.
-pub(super) fn rebalance<I: Input>(input: &I, tree: &BinaryTree, levels: u32) -> BinaryTree {
-    let old = tree.nodes();
-    let runs = runs(old);
-    let mut nodes = vec![BinaryNode::zeroed(); old.len()];
-    // What, into which slot, the nodes below where, and how many levels there are left.
-    let mut todo = Vec::new();
-    if !old.is_empty() {
-        todo.push((Task::Keep(0), 0, 1, levels));
+/// The same leaves from left to right, none below more than `levels` nodes, which must be no fewer than halving
+/// all leaves takes. Subtrees that are shallow enough stay as they are.
+pub(super) fn rebalance(tree: &BinaryTree, levels: u32) -> BinaryTree {
+    let nodes = tree.nodes();
+    if nodes.is_empty() {
+        return BinaryTree::default();
     }
-    while let Some((task, slot, at, levels)) = todo.pop() {
-        // The two parts, and how many leaves are in the left.
-        let (left, right, left_count) = match task {
-            Task::Keep(index) if old[index].is_leaf() => {
-                nodes[slot] = old[index];
-                continue;
-            }
-            Task::Keep(index) => {
-                let [left, right] = old[index].children();
-                let fits = |child: usize| levels > 0 && halvings(runs[child].count) < levels;
-                if runs[index].depth <= levels || (fits(left) && fits(right)) {
-                    (Task::Keep(left), Task::Keep(right), runs[left].count)
-                } else {
-                    halve(runs[index].first, runs[index].count)
+    let mut leaves: Vec<BinaryNode> = nodes.iter().filter(|n| n.is_leaf()).copied().collect();
+    leaves.sort_unstable_by_key(|leaf| leaf.first);
+    let runs = runs(nodes);
+    // How many leaves come before a node's; told apart by the first of them.
+    let rank = |first: u32| leaves.partition_point(|leaf| leaf.first < first);
+    let root = Task::Keep { node: 0, levels };
+    let balanced = lay_out(leaves.len(), root, |task, _| match task {
+        Task::Keep { node, .. } if nodes[node].is_leaf() => Part::Leaf(nodes[node]),
+        Task::Keep { node, levels } => {
+            let [left, right] = nodes[node].children();
+            let Run {
+                first,
+                count,
+                depth,
+            } = runs[node];
+            let fits = |child: usize| halvings(runs[child].count) < levels;
+            if depth <= levels || (fits(left) && fits(right)) {
+                let levels = levels - 1;
+                Part::Inner {
+                    left: Task::Keep { node: left, levels },
+                    right: Task::Keep {
+                        node: right,
+                        levels,
+                    },
+                    left_leaves: runs[left].count,
                 }
+            } else {
+                let first = rank(first);
+                halve(first..first + count)
             }
-            Task::Halve { first, count: 1 } => {
-                nodes[slot] = BinaryNode {
-                    aabb: input.aabb(tree.order()[first]),
-                    first: first as u32,
-                    count: 1,
-                };
-                continue;
-            }
-            Task::Halve { first, count } => halve(first, count),
-        };
-        nodes[slot] = inner(at);
-        let levels = levels.saturating_sub(1);
-        let left_at = at + 2;
-        let right_at = left_at + 2 * left_count - 2;
-        todo.push((right, at + 1, right_at, levels));
-        todo.push((left, at, left_at, levels));
+        }
+        Task::Halve(run) if run.len() == 1 => Part::Leaf(leaves[run.start]),
+        Task::Halve(run) => halve(run),
+    });
+    BinaryTree::new_unchecked(balanced, tree.order().to_vec())
+}
+
+fn halve(run: Range<usize>) -> Part<Task> {
+    let left_leaves = run.len() / 2;
+    let middle = run.start + left_leaves;
+    Part::Inner {
+        left: Task::Halve(run.start..middle),
+        right: Task::Halve(middle..run.end),
+        left_leaves,
     }
-    refit(&mut nodes);
-    BinaryTree::new_unchecked(nodes, tree.order().to_vec())
 }
 
-fn halve(first: usize, count: usize) -> (Task, Task, usize) {
-    let half = count / 2;
-    let left = Task::Halve { first, count: half };
-    let right = Task::Halve {
-        first: first + half,
-        count: count - half,
-    };
-    (left, right, half)
-}
-
-/// How many levels halving `count` leaves down to single ones takes.
+/// How many levels of nodes halving `count` leaves down to single ones takes.
 fn halvings(count: usize) -> u32 {
     count.next_power_of_two().trailing_zeros()
 }
@@ -84,7 +77,8 @@ fn halvings(count: usize) -> u32 {
 /// The leaves below a node.
 #[derive(Clone, Copy, Default)]
 struct Run {
-    first: usize,
+    /// The first place that they have in the tree's order.
+    first: u32,
     count: usize,
     /// How many nodes the deepest is below.
     depth: u32,
@@ -95,7 +89,7 @@ fn runs(nodes: &[BinaryNode]) -> Vec<Run> {
     for (index, node) in nodes.iter().enumerate().rev() {
         runs[index] = if node.is_leaf() {
             Run {
-                first: node.first as usize,
+                first: node.first,
                 count: 1,
                 depth: 0,
             }

@@ -106,8 +106,6 @@ impl Bounds {
 /// References to all primitives that have a place in the tree, and what was left out.
 pub(super) struct Refs {
     pub refs: Vec<Ref>,
-    /// The bounds of twice the centers.
-    pub centers: Bounds,
     pub dropped: usize,
 }
 
@@ -160,16 +158,10 @@ impl Refs {
         let scale = Measure::new(largest).scale();
         // A number is no length.
         let scale = f32x4::new([scale, scale, scale, 1.0]);
-        let mut centers = Bounds::EMPTY;
         for r in &mut refs {
             *r = r.scaled(scale);
-            centers = centers.join_point(r.center2());
         }
-        Ok(Self {
-            refs,
-            centers,
-            dropped,
-        })
+        Ok(Self { refs, dropped })
     }
 }
 

@@ -127,7 +127,7 @@ fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
     let (nodes, order) = tree.into_parts();
     assert_eq!(nodes.len(), 2 * indices.len() - 1);
     let tree = BinaryTree::new(nodes, order).unwrap();
-    assert_same(&bvh, &builder.build_from_tree(&mesh, &tree).unwrap());
+    check_bvh(&builder.build_from_tree(&mesh, &tree).unwrap(), &all, aabb);
 }
 
 fn assert_same(a: &Bvh8, b: &Bvh8) {
@@ -225,7 +225,7 @@ fn the_first_offender_is_named() {
 }
 
 #[test]
-fn triangles_without_area_are_left_out_or_harmless() {
+fn triangles_without_area_are_left_out() {
     let mut positions = dust(100, 5);
     let indices = soup(&positions);
     // Two corners at one place; all three in a line.
@@ -236,7 +236,7 @@ fn triangles_without_area_are_left_out_or_harmless() {
     positions[61] = [0.25; 3];
     positions[62] = [0.5; 3];
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-    let kept: Vec<u32> = (0..100).filter(|id| ![10, 31].contains(id)).collect();
+    let kept: Vec<u32> = (0..100).filter(|id| ![10, 20, 31].contains(id)).collect();
     let bvh = Builder::new().build(&mesh).unwrap();
     check_bvh(&bvh, &kept, |id| {
         Aabb::from_points(mesh.triangle(id as usize).unwrap())

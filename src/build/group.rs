@@ -1,0 +1,185 @@
+//! Leaves of a collapsed tree, joined where one leaf is better than two.
+//!
+//! The collapse makes leaves of whole subtrees alone, and a subtree often has one vertex too many. Those of cousins
+//! are then each half full, and close by.
+
+use super::{
+    binary::{BinaryNode, BinaryTree},
+    collapse::Collapse,
+    cost::Measure,
+    input::Input,
+    lay_out::{Part, lay_out},
+};
+use crate::geometry::Aabb;
+use std::{vec, vec::Vec};
+
+/// The most primitives that a leaf of any kind has.
+const MAX_LEAF: usize = 8;
+
+/// A leaf to be.
+#[derive(Clone, Copy)]
+struct Group {
+    /// The binary node in whose place it is.
+    node: usize,
+    aabb: Aabb,
+    ids: [u32; MAX_LEAF],
+    len: usize,
+}
+
+impl Group {
+    const NONE: Self = Self {
+        node: 0,
+        aabb: Aabb::EMPTY,
+        ids: [0; _],
+        len: 0,
+    };
+
+    fn new(node: usize, aabb: Aabb, primitives: &[u32]) -> Self {
+        let mut ids = [0; MAX_LEAF];
+        ids[..primitives.len()].copy_from_slice(primitives);
+        Self {
+            node,
+            aabb,
+            ids,
+            len: primitives.len(),
+        }
+    }
+
+    fn ids(&self) -> &[u32] {
+        &self.ids[..self.len]
+    }
+
+    fn join(&self, other: &Self) -> Self {
+        let mut joined = *self;
+        joined.aabb = self.aabb.join(other.aabb);
+        joined.len += other.len;
+        joined.ids[self.len..joined.len].copy_from_slice(other.ids());
+        joined
+    }
+}
+
+/// The tree whose leaves are those that it is collapsed to, joined.
+pub(super) fn group<I: Input, const W: usize>(
+    input: &I,
+    tree: &BinaryTree,
+    collapse: &Collapse<W>,
+) -> BinaryTree {
+    let Some(root) = tree.nodes().first() else {
+        return BinaryTree::default();
+    };
+    let groups = groups(input, tree, collapse, &Measure::of_bounds(&root.aabb));
+
+    // The group that a node has become, and how many there are below a node. Below a group there is none.
+    const NONE: u32 = u32::MAX;
+    let mut group_at = vec![NONE; tree.nodes().len()];
+    for (group, index) in groups.iter().zip(0..) {
+        group_at[group.node] = index;
+    }
+    let mut counts = vec![0; tree.nodes().len()];
+    for (index, node) in tree.nodes().iter().enumerate().rev() {
+        if group_at[index] != NONE {
+            counts[index] = 1;
+        } else if !node.is_leaf() {
+            let [left, right] = node.children();
+            counts[index] = counts[left] + counts[right];
+        }
+    }
+
+    let mut order = Vec::with_capacity(tree.order().len());
+    let nodes = lay_out(groups.len(), 0, |mut index: usize, _| {
+        loop {
+            if let Some(group) = groups.get(group_at[index] as usize) {
+                let first = order.len() as u32;
+                order.extend_from_slice(group.ids());
+                return Part::Leaf(BinaryNode {
+                    aabb: group.aabb,
+                    first,
+                    count: group.len as u32,
+                });
+            }
+            // Past nodes of which one side is left.
+            let [left, right] = tree.nodes()[index].children();
+            index = match (counts[left], counts[right]) {
+                (0, _) => right,
+                (_, 0) => left,
+                (left_leaves, _) => {
+                    return Part::Inner {
+                        left,
+                        right,
+                        left_leaves,
+                    };
+                }
+            };
+        }
+    });
+    BinaryTree::new_unchecked(nodes, order)
+}
+
+/// The leaves of every wide node, joined.
+fn groups<I: Input, const W: usize>(
+    input: &I,
+    tree: &BinaryTree,
+    collapse: &Collapse<W>,
+    measure: &Measure,
+) -> Vec<Group> {
+    let mut groups = Vec::new();
+    let leaf = |node: usize| {
+        let primitives = &tree.order()[collapse.leaf(node)?];
+        Some(Group::new(node, tree.nodes()[node].aabb, primitives))
+    };
+    let mut todo = Vec::new();
+    match leaf(0) {
+        Some(group) => groups.push(group),
+        None => todo.push(0),
+    }
+    while let Some(node) = todo.pop() {
+        let (children, count) = collapse.children(node);
+        let (mut leaves, mut len) = ([Group::NONE; W], 0);
+        for &child in &children[..count] {
+            match leaf(child) {
+                Some(leaf) => {
+                    leaves[len] = leaf;
+                    len += 1;
+                }
+                None => todo.push(child),
+            }
+        }
+        groups.extend_from_slice(join_pairs(input, measure, &mut leaves[..len]));
+    }
+    groups
+}
+
+/// Joins leaves, the best pair first, for as long as it is worth it: those that are left.
+fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group]) -> &'a [Group] {
+    const { assert!(I::MAX_LEAF <= MAX_LEAF) };
+    let cost = |aabb: &Aabb, len: usize| measure.half_area(aabb) * I::leaf_cost(len);
+    let mut len = leaves.len();
+    loop {
+        let mut best = 0.0;
+        let mut pair = None;
+        for second in 1..len {
+            for first in 0..second {
+                let (a, b) = (&leaves[first], &leaves[second]);
+                if a.len + b.len > I::MAX_LEAF {
+                    continue;
+                }
+                let joined = cost(&a.aabb.join(b.aabb), a.len + b.len);
+                let apart = cost(&a.aabb, a.len) + cost(&b.aabb, b.len);
+                let gain = apart * I::JOINED - joined;
+                if gain > best {
+                    let joined = a.join(b);
+                    if input.fits(joined.ids()) {
+                        best = gain;
+                        pair = Some((first, second, joined));
+                    }
+                }
+            }
+        }
+        let Some((first, second, joined)) = pair else {
+            return &leaves[..len];
+        };
+        leaves[first] = joined;
+        len -= 1;
+        leaves[second] = leaves[len];
+    }
+}

@@ -1,0 +1,337 @@
+//! A finished binary tree made better: subtrees are taken out and put where they cost least.
+//!
+//! Meister and Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018). Many subtrees
+//! look for their best place at once, in a tree that stands still; then those moves that do not touch each other
+//! are made, the best first. Unlike there, moves are made one after the other: it takes little of the time, and
+//! the outcome is the same on any number of threads.
+
+use super::{
+    binary::{BinaryNode, BinaryTree},
+    cost::Measure,
+    lay_out::{Part, lay_out},
+    refs::Bounds,
+};
+use glam::Vec3;
+use std::{vec, vec::Vec};
+use wide::f32x4;
+
+/// How hard to look.
+#[derive(Clone, Copy)]
+pub(super) struct Effort {
+    /// How often places are looked for at most.
+    pub rounds: usize,
+    /// One of so many nodes looks for a better place in a round: those of the largest area.
+    pub share: usize,
+    /// The least gain of a round, of the whole tree's cost, for which there is another one.
+    pub least_gain: f64,
+}
+
+/// How many places a subtree may look at.
+const MOST_LOOKS: usize = 1 << 12;
+
+/// A node while the tree is changed.
+#[derive(Clone, Copy)]
+struct Spot {
+    /// Scaled by the scene's measure.
+    bounds: Bounds,
+    area: f32,
+    parent: u32,
+    first: u32,
+    count: u32,
+}
+
+/// Where a subtree is best put: next to the node `to`, under a new parent.
+#[derive(Clone, Copy)]
+struct Move {
+    from: u32,
+    to: u32,
+    gain: f32,
+}
+
+/// A tree over the same primitives, of less cost. `tree` is as the builder makes them, and so is what
+/// is returned.
+pub(super) fn optimize(tree: BinaryTree, effort: Effort) -> BinaryTree {
+    let Some(root) = tree.nodes().first() else {
+        return tree;
+    };
+    let measure = Measure::of_bounds(&root.aabb);
+    let mut spots = spots(tree.nodes(), &measure);
+    let mut touched = vec![false; spots.len()];
+    let mut rests = vec![Rest::default(); spots.len()];
+    let least_gain = effort.least_gain * spots.iter().map(|spot| f64::from(spot.area)).sum::<f64>();
+    for _ in 0..effort.rounds {
+        let candidates = candidates(&spots, &mut rests, effort.share);
+        let find = |&from: &u32| find(&spots, from);
+        #[cfg(feature = "rayon")]
+        let moves: Vec<_> = {
+            use rayon::prelude::*;
+            candidates.par_iter().map(find).collect()
+        };
+        #[cfg(not(feature = "rayon"))]
+        let moves: Vec<_> = candidates.iter().map(find).collect();
+        for (&from, found) in candidates.iter().zip(&moves) {
+            rests[from as usize].note(found.is_some());
+        }
+        let mut moves: Vec<_> = moves.into_iter().flatten().collect();
+        moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
+        touched.fill(false);
+        let mut gain = 0.0;
+        for m in &moves {
+            if apply(&mut spots, m, &mut touched) {
+                gain += f64::from(m.gain);
+            }
+        }
+        if gain < least_gain {
+            break;
+        }
+    }
+    changed(&tree, &spots)
+}
+
+fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
+    let vector = |v: Vec3| f32x4::new([v.x, v.y, v.z, 0.0]) * measure.scale();
+    let mut spots: Vec<_> = nodes
+        .iter()
+        .map(|node| {
+            let bounds = Bounds {
+                min: vector(node.aabb.min),
+                max: vector(node.aabb.max),
+            };
+            Spot {
+                bounds,
+                area: bounds.half_area(),
+                parent: 0,
+                first: node.first,
+                count: node.count,
+            }
+        })
+        .collect();
+    for (index, node) in nodes.iter().enumerate() {
+        if !node.is_leaf() {
+            for child in node.children() {
+                spots[child].parent = index as u32;
+            }
+        }
+    }
+    spots
+}
+
+/// For how many rounds a node that found no better place does not look again: one more each time.
+#[derive(Clone, Copy, Default)]
+struct Rest {
+    left: u8,
+    next: u8,
+}
+
+impl Rest {
+    fn note(&mut self, found: bool) {
+        *self = match found {
+            true => Self::default(),
+            false => Self {
+                left: self.next,
+                next: self.next.saturating_add(1),
+            },
+        };
+    }
+}
+
+/// The nodes of the largest area, of which there is the most to be gained, but for those that rest.
+fn candidates(spots: &[Spot], rests: &mut [Rest], share: usize) -> Vec<u32> {
+    let count = spots.len() / share + 1;
+    // The areas' bits, which are in order as none is negative, and the nodes; upside down, for the largest first.
+    let mut keys = Vec::with_capacity(spots.len());
+    for (index, (spot, rest)) in spots.iter().zip(rests).enumerate().skip(1) {
+        if rest.left > 0 {
+            rest.left -= 1;
+        } else {
+            keys.push((u64::from(!spot.area.to_bits()) << 32) | index as u64);
+        }
+    }
+    if count < keys.len() {
+        keys.select_nth_unstable(count);
+        keys.truncate(count);
+    }
+    keys.into_iter().map(|key| key as u32).collect()
+}
+
+/// The other child of a node's parent. Children are neighbours, and only the root comes before them.
+const fn sibling(node: u32) -> u32 {
+    ((node - 1) ^ 1) + 1
+}
+
+/// The best place for the subtree at `from`, if there is a better one than its own.
+fn find(spots: &[Spot], from: u32) -> Option<Move> {
+    let at = |index: u32| &spots[index as usize];
+    let subtree = at(from);
+    let parent = subtree.parent;
+    let mut best = Move {
+        from,
+        to: 0,
+        gain: 0.0,
+    };
+    // What is gained by taking the subtree away, by and by for nodes further up: their area, of which the box
+    // without the subtree is less.
+    let mut gain = at(parent).area;
+    let mut looks = 0;
+    // Nodes to go on below, each with what would be gained there if adding the box took no area at all.
+    let mut todo: Vec<(f32, u32)> = Vec::with_capacity(64);
+    let mut beside = sibling(from);
+    let mut pivot = parent;
+    let mut bounds = at(beside).bounds;
+    loop {
+        let look = |gain: f32, to: u32, best: &mut Move| {
+            let place = at(to);
+            let here = gain - place.bounds.join(subtree.bounds).half_area();
+            if here > best.gain {
+                best.gain = here;
+                best.to = to;
+            }
+            // Further down, this node grows instead; and a box around the subtree is added.
+            match place.count {
+                0 => here + place.area - subtree.area,
+                _ => f32::NEG_INFINITY,
+            }
+        };
+        let below = look(gain, beside, &mut best);
+        if below > best.gain {
+            todo.push((below, beside));
+        }
+        while let Some((below, to)) = todo.pop() {
+            if below <= best.gain {
+                continue;
+            }
+            looks += 1;
+            if looks > MOST_LOOKS {
+                break;
+            }
+            let gain = below + subtree.area;
+            let [a, b] = [at(to).first, at(to).first + 1];
+            let mut sides = [(look(gain, a, &mut best), a), (look(gain, b, &mut best), b)];
+            if sides[0].0 > sides[1].0 {
+                sides.swap(0, 1);
+            }
+            // The better side first, to see early that others are worse.
+            todo.extend(sides.into_iter().filter(|side| side.0 > best.gain));
+        }
+        looks += 1;
+        if pivot == 0 || looks > MOST_LOOKS {
+            break;
+        }
+        if pivot != parent {
+            bounds = bounds.join(at(beside).bounds);
+            gain += at(pivot).area - bounds.half_area();
+        }
+        beside = sibling(pivot);
+        pivot = at(pivot).parent;
+    }
+    let stays = best.to == 0 || best.to == sibling(from) || best.to == parent;
+    (!stays).then_some(best)
+}
+
+/// Makes a move, unless nodes that it changes were changed in this round.
+fn apply(spots: &mut [Spot], m: &Move, touched: &mut [bool]) -> bool {
+    let Move { from, to, .. } = *m;
+    let parent = spots[from as usize].parent;
+    let beside = sibling(from);
+    let changed = [from, to, beside, parent, spots[to as usize].parent];
+    if changed.iter().any(|&node| touched[node as usize]) {
+        return false;
+    }
+    for node in changed {
+        touched[node as usize] = true;
+    }
+
+    // The sibling takes the parent's place; the pair becomes children of a new node in the place of `to`.
+    let place = spots[to as usize];
+    put(spots, parent, spots[beside as usize]);
+    put(spots, beside, place);
+    let to_spot = &mut spots[to as usize];
+    (to_spot.first, to_spot.count) = (from.min(beside), 0);
+    spots[beside as usize].parent = to;
+    spots[from as usize].parent = to;
+    refit_up(spots, to);
+    // The parent has its new box already.
+    refit_up(spots, spots[parent as usize].parent);
+    true
+}
+
+/// Puts a node where another was; only that one's parent stays.
+fn put(spots: &mut [Spot], index: u32, spot: Spot) {
+    let parent = spots[index as usize].parent;
+    spots[index as usize] = Spot { parent, ..spot };
+    if spot.count == 0 {
+        for child in [spot.first, spot.first + 1] {
+            spots[child as usize].parent = index;
+        }
+    }
+}
+
+/// Makes the boxes of a node and those above it anew, as far as they change.
+fn refit_up(spots: &mut [Spot], mut index: u32) {
+    loop {
+        let spot = spots[index as usize];
+        if spot.count == 0 {
+            let child = |child: u32| spots[child as usize].bounds;
+            let bounds = child(spot.first).join(child(spot.first + 1));
+            if bounds.min == spot.bounds.min && bounds.max == spot.bounds.max {
+                return;
+            }
+            let spot = &mut spots[index as usize];
+            spot.bounds = bounds;
+            spot.area = bounds.half_area();
+        }
+        if index == 0 {
+            return;
+        }
+        index = spots[index as usize].parent;
+    }
+}
+
+/// The changed tree, in our order.
+fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
+    // How many leaves are below each node: by a walk from the root, back.
+    let mut counts = vec![1; spots.len()];
+    let mut walk = Vec::with_capacity(spots.len());
+    walk.push(0);
+    let mut next = 0;
+    while let Some(&index) = walk.get(next) {
+        next += 1;
+        let spot = &spots[index];
+        if spot.count == 0 {
+            walk.extend([spot.first as usize, spot.first as usize + 1]);
+        }
+    }
+    for &index in walk.iter().rev() {
+        let spot = &spots[index];
+        if spot.count == 0 {
+            counts[index] = counts[spot.first as usize] + counts[spot.first as usize + 1];
+        }
+    }
+
+    // Leaves are told by their places in the old order, which gives their exact boxes.
+    let mut leaf_at = vec![0; tree.order().len()];
+    for (node, index) in tree.nodes().iter().zip(0u32..) {
+        if node.is_leaf() {
+            leaf_at[node.first as usize] = index;
+        }
+    }
+    let mut order = Vec::with_capacity(tree.order().len());
+    let nodes = lay_out(counts[0], 0, |index: usize, _| {
+        let first = spots[index].first as usize;
+        if spots[index].count == 0 {
+            return Part::Inner {
+                left: first,
+                right: first + 1,
+                left_leaves: counts[first],
+            };
+        }
+        let leaf = tree.nodes()[leaf_at[first] as usize];
+        let place = order.len() as u32;
+        order.extend_from_slice(&tree.order()[first..first + leaf.count as usize]);
+        Part::Leaf(BinaryNode {
+            first: place,
+            ..leaf
+        })
+    });
+    BinaryTree::new_unchecked(nodes, order)
+}
