@@ -116,6 +116,7 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     ];
     let determinant = wa + wb + wc;
     let size = determinant.abs();
+    let (ab, ac) = (b[kz] - a[kz], c[kz] - a[kz]);
     let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
     let extent_y = ay.abs().max(by.abs()).max(cy.abs());
     let ordinary = wa != 0.0
@@ -123,14 +124,14 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
         && wc != 0.0
         && size > pow2(-100)
         && size < pow2(126)
-        && extent_x * extent_y <= size * 8.0;
+        && extent_x / size * extent_y * ab.abs().max(ac.abs()) <= a[kz].abs() * 0.5;
     let [u, v] = if ordinary {
         [wb / determinant, wc / determinant]
     } else {
         exact
     };
 
-    let z = a[kz] + u * (b[kz] - a[kz]) + v * (c[kz] - a[kz]);
+    let z = a[kz] + u * ab + v * ac;
     let t = z * reciprocal + 0.0;
     (t.is_finite() && t_min <= t && t <= t_max).then_some([t, u + 0.0, v + 0.0])
 }

@@ -79,14 +79,12 @@ impl TriangleLeaf {
         t_max: f32,
     ) -> Option<TriangleHits<T::F32x8>> {
         let vertices = ray.shear(token, &self.vertices);
-        let crossed = ray.cross(
-            token,
+        let corners = [
             self.corners_of(vertices.x),
             self.corners_of(vertices.y),
-            self.lanes(),
-        )?;
-        let z = self.corners_of(vertices.z);
-        ray.hit(token, crossed, z, T::F32x8::splat(token, t_max))
+            self.corners_of(vertices.z),
+        ];
+        ray.test(token, corners, self.lanes(), T::F32x8::splat(token, t_max))
     }
 
     /// A number of each vertex as that of each triangle's first, second and third corner.

@@ -38,14 +38,6 @@ pub struct Sheared<V> {
     pub z: V,
 }
 
-/// Triangles, one a lane, that the line of the ray goes through.
-pub struct Crossed<V> {
-    /// Which triangles, a bit each. The weights are meaningful in these lanes alone.
-    mask: u32,
-    u: V,
-    v: V,
-}
-
 /// What a ray found among `N` triangles.
 pub struct TriangleHits<V> {
     /// Which triangles are hit, a bit each. The other fields are meaningful in these lanes alone.
@@ -96,16 +88,16 @@ impl<'a, V> RayShear<'a, V> {
         }
     }
 
-    /// The first half of the test: the triangles, of those that `lanes` has a bit for, that the line of
-    /// the ray goes through. `x` and `y` are the three corners after the shear.
+    /// The triangles, of those that `lanes` has a bit for, that are hit within the ray's range up to
+    /// `t_max`. `x`, `y` and `z` are those of [`Sheared`] for the three corners.
     #[inline(always)]
-    pub(crate) fn cross<const N: usize>(
+    pub(crate) fn test<const N: usize>(
         &self,
         token: V::Token,
-        [ax, bx, cx]: [V; 3],
-        [ay, by, cy]: [V; 3],
+        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]: [[V; 3]; 3],
         lanes: u32,
-    ) -> Option<Crossed<V>>
+        t_max: V,
+    ) -> Option<TriangleHits<V>>
     where
         V: Vector<N>,
     {
@@ -115,20 +107,22 @@ impl<'a, V> RayShear<'a, V> {
         let wc = bx * ay - by * ax;
         let determinant = wa + wb + wc;
         let (least, most) = (wa.min(wb).min(wc), wa.max(wb).max(wc));
-        let finite = determinant.abs().lt(V::splat(token, MAX_DETERMINANT));
+        let size = determinant.abs();
+        let finite = size.lt(V::splat(token, MAX_DETERMINANT));
         let missed = least.lt(zero) & zero.lt(most) & finite;
         let candidates = lanes & !missed.bits();
         if candidates == 0 {
             return None;
         }
 
+        let (ab, ac) = (bz - az, cz - az);
         let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
         let extent_y = ay.abs().max(by.abs()).max(cy.abs());
-        let size = determinant.abs();
+        let doubt = extent_x / size * extent_y * ab.abs().max(ac.abs());
         let certain = (zero.lt(least) | most.lt(zero))
             & finite
             & V::splat(token, MIN_DETERMINANT).lt(size)
-            & (extent_x * extent_y).le(size * V::splat(token, CONDITION));
+            & doubt.le(az.abs() * V::splat(token, CONDITION));
         let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
         if mask != candidates {
@@ -137,30 +131,13 @@ impl<'a, V> RayShear<'a, V> {
             mask |= exact_lanes(candidates & !mask, to_arrays(corners), &mut us, &mut vs);
             (u, v) = (V::load(token, &us), V::load(token, &vs));
         }
-        (mask != 0).then_some(Crossed { mask, u, v })
-    }
 
-    /// The second half: where the crossed triangles are hit, if that is within the ray's range up to
-    /// `t_max`. `z` is [`Sheared::z`] of the three corners.
-    #[inline(always)]
-    pub(crate) fn hit<const N: usize>(
-        &self,
-        token: V::Token,
-        Crossed { mask, u, v }: Crossed<V>,
-        z: [V; 3],
-        t_max: V,
-    ) -> Option<TriangleHits<V>>
-    where
-        V: Vector<N>,
-    {
-        let zero = V::splat(token, 0.0);
-        let [a, b, c] = z;
         // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
-        let t = (a + u * (b - a) + v * (c - a)) * self.reciprocal[self.axes[2]] + zero;
+        let t = (az + u * ab + v * ac) * self.reciprocal[self.axes[2]] + zero;
         let in_range = V::splat(token, self.ray.t_min).le(t)
             & t.le(t_max)
             & t.abs().lt(V::splat(token, f32::INFINITY));
-        let mask = mask & in_range.bits();
+        mask &= in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,
             t,
