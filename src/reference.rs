@@ -92,6 +92,14 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
     let shear = |p: Vec3| [p[kx] - shear[0] * p[kz], p[ky] - shear[1] * p[kz]];
     let ([ax, ay], [bx, by], [cx, cy]) = (shear(a), shear(b), shear(c));
 
+    // Not if it is all behind where the ray begins.
+    let last = (a[kz] * reciprocal)
+        .max(b[kz] * reciprocal)
+        .max(c[kz] * reciprocal);
+    if t_min > last {
+        return None;
+    }
+
     let cross64 = |px: f32, py: f32, qx: f32, qy: f32| {
         f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)
     };

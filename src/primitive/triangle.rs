@@ -110,7 +110,10 @@ impl<'a, V> RayShear<'a, V> {
         let size = determinant.abs();
         let finite = size.lt(V::splat(token, MAX_DETERMINANT));
         let missed = least.lt(zero) & zero.lt(most) & finite;
-        let candidates = lanes & !missed.bits();
+        let reciprocal = self.reciprocal[self.axes[2]];
+        let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
+        let ahead = V::splat(token, self.ray.t_min).le(last);
+        let candidates = lanes & ahead.bits() & !missed.bits();
         if candidates == 0 {
             return None;
         }
@@ -126,14 +129,18 @@ impl<'a, V> RayShear<'a, V> {
         let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
         if mask != candidates {
-            let (mut us, mut vs) = (u.to_array(), v.to_array());
-            let corners = [ax, ay, bx, by, cx, cy];
-            mask |= exact_lanes(candidates & !mask, to_arrays(corners), &mut us, &mut vs);
-            (u, v) = (V::load(token, &us), V::load(token, &vs));
+            let corners = to_arrays([ax, ay, bx, by, cx, cy]);
+            for lane in bits(candidates & !mask) {
+                if let Some([exact_u, exact_v]) = exact_weights(&corners, lane) {
+                    u = u.replace(token, lane, exact_u);
+                    v = v.replace(token, lane, exact_v);
+                    mask |= 1 << lane;
+                }
+            }
         }
 
         // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
-        let t = (az + u * ab + v * ac) * self.reciprocal[self.axes[2]] + zero;
+        let t = (az + u * ab + v * ac) * reciprocal + zero;
         let in_range = V::splat(token, self.ray.t_min).le(t)
             & t.le(t_max)
             & t.abs().lt(V::splat(token, f32::INFINITY));
@@ -159,29 +166,13 @@ fn to_arrays<const N: usize, V: Vector<N>>([a, b, c, d, e, f]: [V; 6]) -> [[f32;
     ]
 }
 
-/// Which of `lanes` are crossed by the exact signs; their weights are written.
-#[cold]
-#[inline(never)]
-fn exact_lanes<const N: usize>(
-    lanes: u32,
-    corners: [[f32; N]; 6],
-    u: &mut [f32; N],
-    v: &mut [f32; N],
-) -> u32 {
-    let mut mask = 0;
-    for lane in bits(lanes) {
-        if let Some(weights) = exact_weights(corners.map(|c| c[lane])) {
-            [u[lane], v[lane]] = weights;
-            mask |= 1 << lane;
-        }
-    }
-    mask
-}
-
-/// The weights of the second and the third corner by the exact signs of the edge functions, or `None` for
-/// a miss. The arguments are x and y of the sheared corners.
-fn exact_weights(corners: [f32; 6]) -> Option<[f32; 2]> {
-    let [ax, ay, bx, by, cx, cy] = corners.map(f64::from);
+/// The weights of the second and the third corner of the triangle in a lane by the exact signs of the edge
+/// functions, or `None` for a miss. `corners` are x and y of each after the shear.
+#[inline(always)]
+fn exact_weights<const N: usize>(corners: &[[f32; N]; 6], lane: usize) -> Option<[f32; 2]> {
+    let [ax, ay, bx, by, cx, cy] = corners;
+    let at = |corner: &[f32; N]| f64::from(corner[lane % N]);
+    let (ax, ay, bx, by, cx, cy) = (at(ax), at(ay), at(bx), at(by), at(cx), at(cy));
     let wa = cx * by - cy * bx;
     let wb = ax * cy - ay * cx;
     let wc = bx * ay - by * ax;

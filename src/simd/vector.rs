@@ -51,6 +51,20 @@ pub trait Vector<const N: usize>:
     /// `self` is a comparison's outcome: bit `i` is lane `i`, the bits above are zero.
     fn bits(self) -> u32;
 
+    /// The same but for lane `lane` modulo `N`, which becomes `x`.
+    #[inline(always)]
+    fn replace(self, token: Self::Token, lane: usize, x: f32) -> Self {
+        // All bits of one lane. A load and a blend: to write a lane of an array and load the array would stall.
+        static ONE_LANE: [f32; 15] = {
+            let mut lanes = [0.0; 15];
+            lanes[7] = f32::from_bits(u32::MAX);
+            lanes
+        };
+        let start = 7 - lane % N;
+        let mask: &[f32; N] = ONE_LANE[start..start + N].try_into().unwrap_or(&[0.0; N]);
+        Self::load(token, mask).select(Self::splat(token, x), self)
+    }
+
     /// Lane `i` becomes lane `lanes[i]` modulo `N`.
     fn permute(self, lanes: &[u8; N]) -> Self;
 }
