@@ -132,7 +132,7 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
         && wc != 0.0
         && size > pow2(-100)
         && size < pow2(126)
-        && extent_x / size * extent_y * ab.abs().max(ac.abs()) <= a[kz].abs() * 0.5;
+        && extent_x / size * extent_y * ab.abs().max(ac.abs()) <= a[kz].abs() * 2.0;
     let [u, v] = if ordinary {
         [wb / determinant, wc / determinant]
     } else {

@@ -40,8 +40,8 @@
 //! weights. Those of `f64` are good to 2^-50 and then rounded. In `f32`, with X and Y the largest |x'| and |y'|
 //! of the corners, an edge function is off by 2u·X·Y + u·itself, the determinant by 6u·X·Y + 3u·itself, and a weight
 //! by 8u·X·Y/|det| + 5u. They are only used where X·Y/|det|·max(|Z.b - Z.a|, |Z.c - Z.a|) <= C·|Z.a|: so the
-//! mean is off by 16u·C·M + 2·5u·2M for the weights, and less than 10u·M for its own operations: 38u·M for
-//! C = [`CONDITION`] = 1/2. The product adds 2u, as does t_max + S: **K_T = 44**.
+//! mean is off by 16u·C·M + 2·5u·2M for the weights, and less than 10u·M for its own operations: 62u·M for
+//! C = [`CONDITION`] = 2. The product adds 2u, as does t_max + S: **K_T = 66**.
 //!
 //! *The pass itself.* A hit that counts has t_min <= t <= t_max. By (4), t_min - S <= t* <= t_max + S; by (2),
 //! near <= t* <= far on each axis: t* is between the two sides of the test. It is enough that *some* box of
@@ -79,11 +79,11 @@ const UNIT_ROUNDOFF: f32 = pow2(-24);
 /// Margin of the box test: derived above.
 const K_BOX: f32 = 14.0;
 /// Margin of the computed `t` of a triangle: derived above.
-const K_T: f32 = 44.0;
+const K_T: f32 = 66.0;
 /// Margin of a primitive's own interval: derived above.
 const K_PRIMITIVE: f32 = 6.0;
 /// How ill-conditioned a triangle's weights may be in `f32`: (4) above.
-pub(crate) const CONDITION: f32 = 0.5;
+pub(crate) const CONDITION: f32 = 2.0;
 /// No distance is taken to be smaller when errors are estimated: (6) above.
 const MIN_EXTENT: f32 = pow2(-70);
 /// Up to here nothing overflows: (6) above.
