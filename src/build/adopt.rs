@@ -11,7 +11,8 @@ use super::{
 use crate::geometry::TriangleMesh;
 use std::{vec, vec::Vec};
 
-/// `tree` without the primitives that are not in `refs`, its leaves split down to single primitives, its boxes made of theirs.
+/// `tree` without the primitives that are not in `refs`, its leaves split down to single primitives, its
+/// boxes made of theirs.
 ///
 /// # Errors
 /// The first place that lists a primitive that is not there; the first primitive that is in no leaf; more

@@ -196,3 +196,61 @@ impl fmt::Display for TreeError {
 }
 
 impl Error for TreeError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    fn new(nodes: &[(u32, u32)], places: u32) -> Result<BinaryTree, TreeError> {
+        let node = |&(first, count): &(u32, u32)| BinaryNode {
+            aabb: Aabb::EMPTY,
+            first,
+            count,
+        };
+        BinaryTree::new(nodes.iter().map(node).collect(), (0..places).collect())
+    }
+
+    #[test]
+    fn trees() {
+        assert!(new(&[], 0).is_ok());
+        assert!(new(&[(0, 2)], 2).is_ok());
+        // Children before their parents, places between leaves that are nobody's.
+        assert!(new(&[(3, 0), (0, 1), (5, 1), (4, 1), (1, 0)], 6).is_ok());
+    }
+
+    #[test]
+    fn no_trees() {
+        let error = |nodes: &[(u32, u32)]| new(nodes, 4).unwrap_err();
+        let child_out_of_range = |node| TreeError::ChildOutOfRange { node };
+        assert_eq!(error(&[(0, 0)]), child_out_of_range(0));
+        assert_eq!(error(&[(1, 0), (0, 1)]), child_out_of_range(0));
+        assert_eq!(
+            error(&[(u32::MAX, 0), (0, 1), (1, 1)]),
+            child_out_of_range(0)
+        );
+        // To the root, to oneself, to another's child.
+        let child_shared = |node, child| TreeError::ChildShared { node, child };
+        assert_eq!(error(&[(1, 0), (0, 0), (0, 1)]), child_shared(1, 0));
+        assert_eq!(error(&[(1, 0), (1, 0), (0, 1)]), child_shared(1, 1));
+        assert_eq!(
+            error(&[(1, 0), (3, 0), (3, 0), (0, 1), (1, 1)]),
+            child_shared(2, 3)
+        );
+        let order_out_of_range = |node| TreeError::OrderOutOfRange { node };
+        assert_eq!(error(&[(1, 0), (0, 1), (3, 2)]), order_out_of_range(2));
+        assert_eq!(error(&[(u32::MAX, u32::MAX)]), order_out_of_range(0));
+        assert_eq!(
+            error(&[(1, 0), (0, 3), (2, 1)]),
+            TreeError::PlaceShared { node: 2, place: 2 }
+        );
+        assert_eq!(error(&[(0, 1), (1, 1)]), TreeError::Unreached { node: 1 });
+        // A circle beside the tree.
+        let circle = [(0, 1), (3, 0), (1, 1), (1, 0), (2, 1)];
+        assert_eq!(error(&circle), TreeError::Unreached { node: 1 });
+        assert_eq!(
+            error(&circle).to_string(),
+            "node 1: the root does not lead to it"
+        );
+    }
+}

@@ -15,8 +15,13 @@ use crate::{
     layout::{Bvh, Bvh8, LayoutError, Owned, PrimitiveLeaf, STACK, TriangleLeaf, WideNode},
 };
 
-/// Builds hierarchies: a binary tree by the surface area heuristic, collapsed to wide nodes at the least
-/// cost.
+/// Builds hierarchies: a binary tree by the surface area heuristic, its subtrees moved to where they cost
+/// least, collapsed to wide nodes at the least cost.
+///
+/// - The tree: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
+/// - The moves: Meister and Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018).
+/// - The collapse: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide
+///   BVHs" (2017).
 ///
 /// The same input gives the same bits, on however many threads (feature `rayon`).
 ///
@@ -49,7 +54,7 @@ impl Builder {
 
     /// The hierarchy over a mesh, 8 wide.
     ///
-    /// Triangles of which two corners are at one place are left out: no ray hits them.
+    /// Triangles without area, whose corners are on one line, are left out: no ray hits them.
     ///
     /// # Errors
     /// The first position that is not finite, of those that triangles use.
@@ -99,8 +104,9 @@ impl Builder {
 
     /// The hierarchy over a mesh from a binary tree over its triangles, 8 wide.
     ///
-    /// The tree's boxes are worked out anew. Which leaves and wide nodes come of it is the builder's choice;
-    /// leaves of several triangles are split where that is cheaper.
+    /// The tree's boxes are not relied on: they are worked out anew. Its leaves are split down to single triangles,
+    /// and the collapse chooses the leaves and the wide nodes. Else the tree stays as it is, unless that
+    /// would take a query more than its stack.
     ///
     /// # Errors
     /// As [`build`](Self::build); the first place of the tree's order with a triangle that is not in the mesh, or the
@@ -166,17 +172,19 @@ impl Builder {
     }
 }
 
-/// Of a tree of single primitives.
+/// For a tree of single primitives: what is large finds its place before leaves are made.
 const SINGLE: Effort = Effort {
-    rounds: 10,
+    rounds: 20,
     share: 40,
     least_gain: 1e-3,
 };
 
-/// Of a tree of leaves, of which there are a fourth.
+/// For a tree of leaves, of which there are a fourth as many. Together the two take a kitchen from 8.5 to 6.4
+/// nodes a bounce ray, game levels from 8.5, 8.2 and 8.6 to 7.2, 7.8 and 7.5, for as much time again as the
+/// build takes without; more rounds bring 1 % more at most. A scan gains 1 % and is done after a few.
 const GROUPED: Effort = Effort {
-    rounds: 30,
-    share: 5,
+    rounds: 40,
+    share: 3,
     least_gain: 1e-3,
 };
 

@@ -53,8 +53,7 @@ pub(super) struct Collapse<'a, const W: usize> {
 }
 
 impl<'a, const W: usize> Collapse<'a, W> {
-    /// Of a tree as the builder makes them: one primitive a leaf; the nodes below a node are a range of
-    /// their own, which begins with its children and goes on with those below the left one.
+    /// Of a tree in our order, whose leaves all fit.
     pub fn new<I: Input>(input: &I, tree: &'a BinaryTree) -> Self {
         const { assert!(W >= 2 && W <= MAX_WIDTH) };
         let nodes = tree.nodes();
@@ -125,7 +124,8 @@ struct Solver<'a, const W: usize, I> {
 }
 
 impl<const W: usize, I: Input> Solver<'_, W, I> {
-    /// Every node after those below it, without recursion: ranges of small subtrees first, at once, then what is above.
+    /// Every node after those below it, without recursion: the ranges below small subtrees first, at
+    /// once, then what is above.
     fn solve_all(&self, entries: &mut [Entry]) {
         let tasks = self.tasks();
         let mut slices = Vec::with_capacity(tasks.len());
@@ -160,7 +160,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         }
     }
 
-    /// What is below the largest subtrees of up to [`TASK_NODES`] nodes: ranges, in order.
+    /// What is below the largest subtrees of up to [`TASK_NODES`] nodes, as ranges from left to right.
     fn tasks(&self) -> Vec<Range<usize>> {
         let nodes = self.tree.nodes();
         let mut tasks = Vec::new();
@@ -241,6 +241,94 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             count,
             fits,
             is_leaf,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        build::{Builder, input::Boxes},
+        geometry::Aabb,
+    };
+    use glam::Vec3;
+
+    fn boxes(count: u32) -> Vec<Aabb> {
+        let unit = |n: u32| f32::from(n.wrapping_mul(0x9e37_79b9).rotate_left(13) as u16) / 65536.0;
+        let point = |n: u32| Vec3::new(unit(3 * n), unit(3 * n + 1), unit(3 * n + 2));
+        let aabb = |i: u32| Aabb::from_points([point(2 * i), point(2 * i + 1)]);
+        (0..count).map(aabb).collect()
+    }
+
+    /// Every way to take a subtree apart into roots: how many, and what they cost.
+    fn forests<const W: usize>(
+        tree: &BinaryTree,
+        measure: &Measure,
+        node: usize,
+    ) -> (Vec<(usize, f32)>, usize) {
+        let BinaryNode { aabb, count, .. } = tree.nodes()[node];
+        let area = measure.half_area(&aabb);
+        if count > 0 {
+            return (vec![(1, area * Boxes::leaf_cost(1))], 1);
+        }
+        let [(left, left_count), (right, right_count)] = tree.nodes()[node]
+            .children()
+            .map(|child| forests::<W>(tree, measure, child));
+        let count = left_count + right_count;
+        let mut all = Vec::new();
+        for (left_roots, left_cost) in &left {
+            for (right_roots, right_cost) in &right {
+                all.push((left_roots + right_roots, left_cost + right_cost));
+            }
+        }
+        let costs = all
+            .iter()
+            .filter(|(roots, _)| *roots <= W)
+            .map(|(_, cost)| cost);
+        let mut whole = area * cost::NODE + costs.copied().fold(f32::INFINITY, f32::min);
+        if count <= Boxes::MAX_LEAF {
+            whole = whole.min(area * Boxes::leaf_cost(count));
+        }
+        all.push((1, whole));
+        (all, count)
+    }
+
+    /// What the wide nodes and leaves below a node cost.
+    fn cost_of<const W: usize>(collapse: &Collapse<W>, measure: &Measure, node: usize) -> f32 {
+        let area = measure.half_area(&collapse.tree.nodes()[node].aabb);
+        if let Some(leaf) = collapse.leaf(node) {
+            return area * Boxes::leaf_cost(leaf.len());
+        }
+        let (children, count) = collapse.children(node);
+        assert!((2..=W).contains(&count));
+        let below = children[..count]
+            .iter()
+            .map(|&child| cost_of(collapse, measure, child));
+        area * cost::NODE + below.sum::<f32>()
+    }
+
+    fn check<const W: usize>(count: u32) {
+        let boxes = boxes(count);
+        let input = Boxes(&boxes);
+        let tree = Builder::new().build_primitives_binary(&boxes).unwrap();
+        let measure = Measure::of_bounds(&tree.nodes()[0].aabb);
+        let collapse = Collapse::<W>::new(&input, &tree);
+        let (all, _) = forests::<W>(&tree, &measure, 0);
+        let whole = all.iter().filter(|(roots, _)| *roots == 1);
+        let least = whole.map(|&(_, cost)| cost).fold(f32::INFINITY, f32::min);
+        let promised = collapse.entries[0].forest[0];
+        let found = cost_of(&collapse, &measure, 0);
+        assert!((promised / least - 1.0).abs() < 1e-5, "{promised}, {least}");
+        assert!((found / least - 1.0).abs() < 1e-5, "{found}, {least}");
+    }
+
+    #[test]
+    fn no_cheaper_way() {
+        for count in 1..18 {
+            check::<2>(count);
+            check::<4>(count);
+            check::<8>(count);
         }
     }
 }

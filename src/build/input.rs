@@ -13,7 +13,7 @@ use glam::Vec3;
 pub(super) enum Verdict {
     /// Yes, in this box.
     Keep(Aabb),
-    /// No ray can hit it.
+    /// No: no ray hits a triangle without area or what has no points.
     Unhittable,
     /// No, if the caller wants such ones left out; else an error.
     NonFinite(BuildError),

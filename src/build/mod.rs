@@ -1,9 +1,14 @@
 //! Building hierarchies: from primitives to a binary tree, from there to wide nodes.
 //!
-//! 1. `refs`: every primitive is looked at; its box and its number.
+//! 1. `refs`: every primitive of the `input` is looked at; its box and its number.
 //! 2. `binned`, by `split` and `sweep`: the binary tree, from the top down. Or `adopt`: a caller's.
-//! 3. `collapse`: which subtrees are leaves and which nodes become one, at the least `cost`.
-//! 4. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
+//! 3. `reinsertion`: subtrees are moved to where they cost least.
+//! 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`.
+//! 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
+//! 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
+//!
+//! All binary trees on the way have their nodes in the order of `lay_out`. No step recurses deeper than a
+//! bound, whatever the tree.
 
 mod adopt;
 mod binary;

@@ -1,6 +1,6 @@
 //! Two things at once with feature `rayon`, one after the other without.
 
-/// Below this many primitives a task is not worth handing over: they take some 100 µs, a hand-over a few.
+/// Fewer primitives than this are not worth handing over: they take some 300 µs, a hand-over a few.
 pub(super) const TASK: usize = 1024;
 
 /// Both results. At once, if `worth_it`.

@@ -104,3 +104,50 @@ fn runs(nodes: &[BinaryNode]) -> Vec<Run> {
     }
     runs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Aabb;
+
+    #[test]
+    fn no_deeper_than_asked() {
+        // A chain, in our order: leaves left.
+        for leaves in [1, 2, 3, 37, 38, 1000, 70_000u32] {
+            let mut nodes = vec![BinaryNode {
+                aabb: Aabb::EMPTY,
+                first: 1,
+                count: 0,
+            }];
+            for leaf in 0..leaves - 1 {
+                let below = nodes.len() as u32 + 2;
+                nodes.push(BinaryNode {
+                    aabb: Aabb::EMPTY,
+                    first: leaf,
+                    count: 1,
+                });
+                nodes.push(BinaryNode {
+                    aabb: Aabb::EMPTY,
+                    first: below,
+                    count: 0,
+                });
+            }
+            let last = nodes.len() - 1;
+            nodes[last] = BinaryNode {
+                aabb: Aabb::EMPTY,
+                first: leaves - 1,
+                count: 1,
+            };
+            let tree = BinaryTree::new(nodes, (0..leaves).collect()).unwrap();
+            for levels in [halvings(leaves as usize), 17, 36] {
+                let balanced = rebalance(&tree, levels);
+                assert!(runs(balanced.nodes())[0].depth <= levels);
+                let (nodes, order) = balanced.into_parts();
+                assert_eq!(nodes.len(), tree.nodes().len());
+                assert!(BinaryTree::new(nodes, order).is_ok());
+            }
+            // What is shallow enough stays.
+            assert_eq!(rebalance(&tree, leaves), tree);
+        }
+    }
+}

@@ -70,9 +70,10 @@ impl TriangleLeaf {
         })
     }
 
-    /// The ray against all its triangles, up to `t_max`.
+    /// The ray against all its triangles, up to `t_max`. If `NEED_T` is not set, it is enough to know
+    /// whether any is hit.
     #[inline(always)]
-    pub(crate) fn test<T: Simd>(
+    pub(crate) fn test<T: Simd, const NEED_T: bool>(
         &self,
         token: T,
         ray: &RayShear<'_, T::F32x8>,
@@ -84,7 +85,7 @@ impl TriangleLeaf {
             self.corners_of(vertices.y),
             self.corners_of(vertices.z),
         ];
-        ray.test(token, corners, self.lanes(), T::F32x8::splat(token, t_max))
+        ray.test::<8, NEED_T>(token, corners, self.lanes(), T::F32x8::splat(token, t_max))
     }
 
     /// A number of each vertex as that of each triangle's first, second and third corner.

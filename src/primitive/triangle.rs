@@ -15,7 +15,7 @@
 use crate::{
     geometry::Ray,
     simd::Vector,
-    slab::{CONDITION, PreparedRay, pow2},
+    slab::{CONDITION, PreparedRay, UNIT_ROUNDOFF, pow2},
 };
 
 /// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
@@ -89,9 +89,10 @@ impl<'a, V> RayShear<'a, V> {
     }
 
     /// The triangles, of those that `lanes` has a bit for, that are hit within the ray's range up to
-    /// `t_max`. `x`, `y` and `z` are those of [`Sheared`] for the three corners.
+    /// `t_max`. `x`, `y` and `z` are those of [`Sheared`] for the three corners. If `NEED_T` is not set, it is
+    /// enough to know whether there are any.
     #[inline(always)]
-    pub(crate) fn test<const N: usize>(
+    pub(crate) fn test<const N: usize, const NEED_T: bool>(
         &self,
         token: V::Token,
         [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]: [[V; 3]; 3],
@@ -121,29 +122,42 @@ impl<'a, V> RayShear<'a, V> {
         let (ab, ac) = (bz - az, cz - az);
         let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
         let extent_y = ay.abs().max(by.abs()).max(cy.abs());
-        let doubt = extent_x / size * extent_y * ab.abs().max(ac.abs());
-        let certain = (zero.lt(least) | most.lt(zero))
-            & finite
-            & V::splat(token, MIN_DETERMINANT).lt(size)
-            & doubt.le(az.abs() * V::splat(token, CONDITION));
+        let depth = ab.abs().max(ac.abs());
+        let doubt = extent_x / size * extent_y * depth;
+        // Where the signs are certain, and nothing overflows or vanishes.
+        let sound =
+            (zero.lt(least) | most.lt(zero)) & finite & V::splat(token, MIN_DETERMINANT).lt(size);
+        let certain = sound & doubt.le(az.abs() * V::splat(token, CONDITION));
         let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
+        // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
+        let mut t = (az + u * ab + v * ac) * reciprocal + zero;
+        let t_min = V::splat(token, self.ray.t_min);
         if mask != candidates {
+            // How far `t` may be off, twice over: it is worked out again only if that matters.
+            let error = (doubt * V::splat(token, 32.0 * UNIT_ROUNDOFF)
+                + (az.abs() + depth) * V::splat(token, 64.0 * UNIT_ROUNDOFF))
+                * reciprocal.abs();
+            let (least_t, most_t) = (t - error, t + error);
+            if !NEED_T {
+                let inside = sound & t_min.le(least_t) & most_t.le(t_max);
+                if candidates & inside.bits() != 0 {
+                    return Some(TriangleHits { mask, t, u, v });
+                }
+            }
+            let outside = sound & (most_t.lt(t_min) | t_max.lt(least_t));
             let corners = to_arrays([ax, ay, bx, by, cx, cy]);
-            for lane in bits(candidates & !mask) {
+            for lane in bits(candidates & !mask & !outside.bits()) {
                 if let Some([exact_u, exact_v]) = exact_weights(&corners, lane) {
                     u = u.replace(token, lane, exact_u);
                     v = v.replace(token, lane, exact_v);
                     mask |= 1 << lane;
                 }
             }
+            t = (az + u * ab + v * ac) * reciprocal + zero;
         }
 
-        // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
-        let t = (az + u * ab + v * ac) * reciprocal + zero;
-        let in_range = V::splat(token, self.ray.t_min).le(t)
-            & t.le(t_max)
-            & t.abs().lt(V::splat(token, f32::INFINITY));
+        let in_range = t_min.le(t) & t.le(t_max) & t.abs().lt(V::splat(token, f32::INFINITY));
         mask &= in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,

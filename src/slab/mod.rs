@@ -75,7 +75,7 @@ use crate::{
 };
 
 /// Half the distance from 1 to the next float: the relative error of one rounding.
-const UNIT_ROUNDOFF: f32 = pow2(-24);
+pub(crate) const UNIT_ROUNDOFF: f32 = pow2(-24);
 /// Margin of the box test: derived above.
 const K_BOX: f32 = 14.0;
 /// Margin of the computed `t` of a triangle: derived above.

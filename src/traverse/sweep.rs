@@ -44,7 +44,7 @@ pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> 
             };
             let shear = RayShear::new(&prepared, prepared.reciprocals(token));
             let hits = |leaf: &TriangleLeaf| {
-                leaf.test(token, &shear, prepared.ray.t_max)
+                leaf.test::<T, true>(token, &shear, prepared.ray.t_max)
                     .map_or(0, |hits| hits.mask.count_ones())
             };
             self.0.iter().map(hits).sum()

@@ -157,7 +157,7 @@ impl<T: Simd> Visitor<TriangleLeaf> for ClosestVisitor<'_, T> {
 
     #[inline(always)]
     fn leaf(&mut self, leaf: &TriangleLeaf) -> ControlFlow<(), f32> {
-        if let Some(hits) = leaf.test(self.token, &self.shear, self.t_max) {
+        if let Some(hits) = leaf.test::<T, true>(self.token, &self.shear, self.t_max) {
             let (t, u, v) = (hits.t.to_array(), hits.u.to_array(), hits.v.to_array());
             for lane in bits(hits.mask) {
                 let found = Found {
@@ -193,7 +193,10 @@ impl<T: Simd> Visitor<TriangleLeaf> for AnyVisitor<'_, T> {
 
     #[inline(always)]
     fn leaf(&mut self, leaf: &TriangleLeaf) -> ControlFlow<(), f32> {
-        if leaf.test(self.token, &self.shear, self.t_max).is_some() {
+        if leaf
+            .test::<T, false>(self.token, &self.shear, self.t_max)
+            .is_some()
+        {
             self.found = true;
             return ControlFlow::Break(());
         }
