@@ -86,7 +86,8 @@ fn sah_cost<N: WideNode, L: Leaf>(bvh: &Bvh<N, L, Owned>, leaf_cost: impl Fn(usi
     // In `f64`: a million small terms.
     let mut below = 0.0;
     for node in bvh.nodes() {
-        for (lane, &child) in node.children().iter().enumerate() {
+        for lane in 0..N::WIDTH {
+            let child = node.child(lane);
             if child != Child::EMPTY {
                 let area = measure.half_area(&node.child_aabb(lane));
                 below += f64::from(area * cost(child));

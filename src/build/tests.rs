@@ -95,7 +95,8 @@ fn check_bvh<N: WideNode, L: Leaf>(
     };
     let mut boxes = vec![Aabb::EMPTY; bvh.nodes().len()];
     for (index, node) in bvh.nodes().iter().enumerate().rev() {
-        for (lane, child) in node.children().iter().enumerate() {
+        for lane in 0..N::WIDTH {
+            let child = node.child(lane);
             let below = match child.kind() {
                 ChildKind::Empty => continue,
                 ChildKind::Node(node) => boxes[node],

@@ -1,6 +1,6 @@
 //! The check that a walk relies on: every place is in range, the nodes are a tree, and it fits the stack.
 
-use super::{Child, ChildKind, Leaf, WideNode};
+use super::{Child, ChildKind, Leaf, Link, WideNode};
 use crate::geometry::Aabb;
 use core::{error::Error, fmt};
 
@@ -42,7 +42,7 @@ pub enum LayoutError {
 impl fmt::Display for LayoutError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::TooLarge => write!(f, "more than 2^31 - 2 nodes or leaves"),
+            Self::TooLarge => write!(f, "more nodes or leaves than 31 bits tell apart"),
             Self::Child { node, lane } => {
                 write!(
                     f,
@@ -72,7 +72,8 @@ pub(super) fn check<N: WideNode, L: Leaf>(
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
     let most = (1 << 31) - 2;
-    if nodes.len() > most || leaves.len() > most || primitives.len() > u32::MAX as usize {
+    let most_nodes = most / (size_of::<N>() / Link::UNIT);
+    if nodes.len() > most_nodes || leaves.len() > most || primitives.len() > u32::MAX as usize {
         return Err(LayoutError::TooLarge);
     }
     for (index, leaf) in leaves.iter().enumerate() {
@@ -98,12 +99,13 @@ pub(super) fn check<N: WideNode, L: Leaf>(
             return Err(LayoutError::TooDeep(index));
         }
         let first_node = next_node;
-        for (lane, child) in node.children()[..children].iter().enumerate() {
+        for lane in 0..children {
+            let child = node.child(lane);
             let (expected, count) = match child.kind() {
                 ChildKind::Leaf(_) => (Child::leaf(next_leaf as u32), leaves.len()),
                 _ => (Child::node(next_node as u32), nodes.len()),
             };
-            if *child != expected || child.index() >= count {
+            if child != expected || child.index() >= count {
                 return Err(LayoutError::Child { node: index, lane });
             }
             next_leaf += usize::from(child.is_leaf());
@@ -135,7 +137,8 @@ fn count_children<N: WideNode>(
     bounds: &Aabb,
 ) -> Result<usize, LayoutError> {
     let mut count = 0;
-    for (lane, child) in node.children().iter().enumerate() {
+    for lane in 0..N::WIDTH {
+        let child = node.child(lane);
         let aabb = node.child_aabb(lane);
         if child.kind() == ChildKind::Empty {
             if aabb != Aabb::EMPTY {

@@ -55,6 +55,69 @@ impl Child {
         self.0 & Self::LEAF != 0
     }
 
+    /// The place it leads to, if it is not empty.
+    #[inline(always)]
+    pub(crate) const fn index(self) -> usize {
+        (self.0 & !Self::LEAF) as usize
+    }
+}
+
+/// A [`Child`] as nodes hold it: the place of a node is counted in [`Link::UNIT`]s of bytes, so that a walk
+/// shifts where it would multiply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Link(u32);
+
+impl Link {
+    /// 16 bytes.
+    pub const UNIT: usize = 1 << Self::SHIFT;
+    const SHIFT: u32 = 4;
+
+    /// The link to `child`, nodes being `N`, which is a whole number of units. Of a place too far away for
+    /// 31 bits, nothing sensible comes: the layout's check sees it.
+    #[inline]
+    pub const fn new<N>(child: Child) -> Self {
+        const { assert!(size_of::<N>() % Self::UNIT == 0) };
+        match child.kind() {
+            ChildKind::Node(index) => {
+                Self((index as u32).wrapping_mul(Self::units::<N>()) & !Child::LEAF)
+            }
+            _ => Self(child.0),
+        }
+    }
+
+    /// What it leads to.
+    #[inline]
+    pub const fn child<N>(self) -> Child {
+        if self.is_leaf() {
+            Child(self.0)
+        } else {
+            Child(self.0 / Self::units::<N>())
+        }
+    }
+
+    const fn units<N>() -> u32 {
+        (size_of::<N>() / Self::UNIT) as u32
+    }
+
+    /// Whether it leads to a leaf, if it is not empty.
+    #[inline(always)]
+    pub(crate) const fn is_leaf(self) -> bool {
+        self.0 & Child::LEAF != 0
+    }
+
+    /// The place of the leaf it leads to.
+    #[inline(always)]
+    pub(crate) const fn leaf(self) -> usize {
+        (self.0 & !Child::LEAF) as usize
+    }
+
+    /// How many bytes after the first node is that it leads to.
+    #[inline(always)]
+    pub(crate) const fn node_offset(self) -> usize {
+        (self.0 as usize) << Self::SHIFT
+    }
+
     #[inline(always)]
     pub(crate) const fn to_bits(self) -> u32 {
         self.0
@@ -63,12 +126,6 @@ impl Child {
     #[inline(always)]
     pub(crate) const fn from_bits(bits: u32) -> Self {
         Self(bits)
-    }
-
-    /// The place it leads to, if it is not empty.
-    #[inline(always)]
-    pub(crate) const fn index(self) -> usize {
-        (self.0 & !Self::LEAF) as usize
     }
 }
 

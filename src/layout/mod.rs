@@ -12,7 +12,7 @@ pub use bvh::{Bvh, Bvh4Ref, Bvh8Ref, PrimitiveBvh4Ref, PrimitiveBvh8Ref};
 pub use bvh::{Bvh4, Bvh8, PrimitiveBvh4, PrimitiveBvh8};
 pub use check::LayoutError;
 pub(crate) use check::STACK;
-pub use child::{Child, ChildKind};
+pub use child::{Child, ChildKind, Link};
 pub use leaf::{Leaf, PrimitiveLeaf, TriangleLeaf};
 pub use node::{Node, Node4, Node8, WideNode};
 #[cfg(feature = "alloc")]

@@ -1,6 +1,6 @@
 //! Full-precision nodes, 4 and 8 wide.
 
-use super::Child;
+use super::{Child, Link};
 use crate::{
     geometry::{Aabb, Ray},
     simd::{Simd, Vector},
@@ -24,8 +24,15 @@ pub trait WideNode: Pod + Sealed {
     /// left out.
     fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self;
 
-    /// What each lane leads to.
-    fn children(&self) -> &[Child];
+    /// What each lane leads to, as it is stored.
+    fn links(&self) -> &[Link];
+
+    /// What a lane leads to.
+    fn child(&self, lane: usize) -> Child {
+        self.links()
+            .get(lane)
+            .map_or(Child::EMPTY, |link| link.child::<Self>())
+    }
 
     /// The bounds of the child in a lane, as they are tested. Empty past the last.
     fn child_aabb(&self, lane: usize) -> Aabb;
@@ -67,7 +74,7 @@ mod sealed {
 pub struct Node<const W: usize, A> {
     align: [A; 0],
     planes: Planes<W>,
-    children: [Child; W],
+    links: [Link; W],
 }
 
 /// 16 bytes of alignment.
@@ -107,8 +114,8 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn children(&self) -> &[Child] {
-                &self.children
+            fn links(&self) -> &[Link] {
+                &self.links
             }
 
             fn child_aabb(&self, lane: usize) -> Aabb {
@@ -161,14 +168,14 @@ impl<const W: usize, A> Node<W, A> {
         let mut node = Self {
             align: [],
             planes: [[[f32::INFINITY; W], [f32::NEG_INFINITY; W]]; 3],
-            children: [Child::EMPTY; W],
+            links: [Link::new::<Self>(Child::EMPTY); W],
         };
         for (lane, (aabb, child)) in children.into_iter().take(W).enumerate() {
             for axis in 0..3 {
                 node.planes[axis][0][lane] = aabb.min[axis];
                 node.planes[axis][1][lane] = aabb.max[axis];
             }
-            node.children[lane] = child;
+            node.links[lane] = Link::new::<Self>(child);
         }
         node
     }

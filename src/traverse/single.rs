@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Child, Leaf, STACK, Storage, WideNode},
+    layout::{Bvh, Child, Leaf, Link, STACK, Storage, WideNode},
     simd::Simd,
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
@@ -29,8 +29,8 @@ struct Entry(i64);
 
 impl Entry {
     #[inline(always)]
-    fn new(near: f32, child: Child) -> Self {
-        Self(i64::from(near.to_bits()) << 32 | i64::from(child.to_bits()))
+    fn new(near: f32, link: Link) -> Self {
+        Self(i64::from(near.to_bits()) << 32 | i64::from(link.to_bits()))
     }
 
     #[inline(always)]
@@ -39,8 +39,8 @@ impl Entry {
     }
 
     #[inline(always)]
-    fn child(self) -> Child {
-        Child::from_bits(self.0 as u32)
+    fn link(self) -> Link {
+        Link::from_bits(self.0 as u32)
     }
 }
 
@@ -60,23 +60,23 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
     if bvh.root() == Child::EMPTY {
         return;
     }
-    let (nodes, leaves) = (bvh.nodes(), bvh.leaves());
+    let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves());
     let slabs = N::slabs(token, ray, reciprocal, bvh.bounds());
     let margin = N::margin(&slabs);
     let mut t_max = ray.t_max + margin;
     // Apart, so that the length stays in a register and nothing is cleared.
     let mut stack: Stack = [MaybeUninit::uninit(); STACK];
     let mut len = 0;
-    let mut current = bvh.root();
+    let mut current = Link::new::<N>(bvh.root());
     loop {
         while !current.is_leaf() {
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
-            let node = unsafe { nodes.get_unchecked(current.index()) };
+            let node = unsafe { &*nodes.byte_add(current.node_offset()) };
             let (mut mask, near) = node.test(token, &slabs, N::splat(token, t_max));
             if mask == 0 {
                 match pop(&stack, &mut len, t_max) {
-                    Some(child) => current = child,
+                    Some(link) => current = link,
                     None => return,
                 }
                 continue;
@@ -84,15 +84,15 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
             let first = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             // SAFETY: `mask` has bits for the node's lanes alone.
-            current = unsafe { *node.children().get_unchecked(first) };
+            current = unsafe { *node.links().get_unchecked(first) };
             if mask == 0 {
                 continue;
             }
             let near = N::lanes(&near);
             // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
             let entry = |lane: usize| unsafe {
-                let child = *node.children().get_unchecked(lane);
-                Entry::new(*near.as_ref().get_unchecked(lane), child)
+                let link = *node.links().get_unchecked(lane);
+                Entry::new(*near.as_ref().get_unchecked(lane), link)
             };
             let mut nearest = entry(first);
             let base = len;
@@ -118,17 +118,17 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
                 // SAFETY: these were just written.
                 unsafe { sort(stack.get_unchecked_mut(base..len)) };
             }
-            current = nearest.child();
+            current = nearest.link();
         }
 
         // SAFETY: the layout's check saw that all leaves led to are there.
-        let leaf = unsafe { leaves.get_unchecked(current.index()) };
+        let leaf = unsafe { leaves.get_unchecked(current.leaf()) };
         match visitor.leaf(leaf) {
             ControlFlow::Break(()) => return,
             ControlFlow::Continue(t) => t_max = t + margin,
         }
         match pop(&stack, &mut len, t_max) {
-            Some(child) => current = child,
+            Some(link) => current = link,
             None => return,
         }
     }
@@ -136,13 +136,13 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
 
 /// The last child left behind that is still near enough.
 #[inline(always)]
-fn pop(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Child> {
+fn pop(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Link> {
     while *len > 0 {
         *len -= 1;
         // SAFETY: those below the length were written.
         let entry = unsafe { stack.get_unchecked(*len).assume_init() };
         if entry.near() <= t_max {
-            return Some(entry.child());
+            return Some(entry.link());
         }
     }
     None
