@@ -16,6 +16,9 @@ impl Simd for Portable {
         let [a, b, c, d, ..] = vector.to_array();
         f32x4::new([a, b, c, d])
     }
+
+    #[inline(always)]
+    fn prefetch(self, _: *const u8) {}
 }
 
 macro_rules! impl_vector {

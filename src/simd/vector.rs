@@ -11,6 +11,9 @@ pub trait Simd: Copy {
 
     /// The first four of eight.
     fn low(vector: Self::F32x8) -> Self::F32x4;
+
+    /// Has the three cache lines from `address` on fetched, if the backend can. Any address will do.
+    fn prefetch(self, address: *const u8);
 }
 
 /// `N` floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.

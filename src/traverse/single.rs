@@ -106,6 +106,12 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
                 } else {
                     other
                 };
+                let link = farther.link();
+                token.prefetch(if link.is_leaf() {
+                    leaves.as_ptr().wrapping_add(link.leaf()).cast()
+                } else {
+                    nodes.wrapping_byte_add(link.node_offset()).cast()
+                });
                 // SAFETY: the layout's check saw that a walk never leaves more than `STACK`
                 // children behind.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
