@@ -128,26 +128,31 @@ impl<'a, V> RayShear<'a, V> {
         let sound =
             (zero.lt(least) | most.lt(zero)) & finite & V::splat(token, MIN_DETERMINANT).lt(size);
         let certain = sound & doubt.le(az.abs() * V::splat(token, CONDITION));
-        let mut mask = candidates & certain.bits();
         let (mut u, mut v) = (wb / determinant, wc / determinant);
         // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
         let mut t = (az + u * ab + v * ac) * reciprocal + zero;
-        let t_min = V::splat(token, self.ray.t_min);
-        if mask != candidates {
-            // How far `t` may be off, twice over: it is worked out again only if that matters.
-            let error = (doubt * V::splat(token, 32.0 * UNIT_ROUNDOFF)
-                + (az.abs() + depth) * V::splat(token, 64.0 * UNIT_ROUNDOFF))
-                * reciprocal.abs();
-            let (least_t, most_t) = (t - error, t + error);
-            if !NEED_T {
-                let inside = sound & t_min.le(least_t) & most_t.le(t_max);
-                if candidates & inside.bits() != 0 {
-                    return Some(TriangleHits { mask, t, u, v });
-                }
+
+        // How far `t` may be off, twice over: where it cannot matter, no better one is worked out.
+        let error = (doubt * V::splat(token, 32.0 * UNIT_ROUNDOFF)
+            + (az.abs() + depth) * V::splat(token, 64.0 * UNIT_ROUNDOFF))
+            * reciprocal.abs();
+        let (least_t, most_t) = (t - error, t + error);
+        let (t_min, infinity) = (
+            V::splat(token, self.ray.t_min),
+            V::splat(token, f32::INFINITY),
+        );
+        let outside = sound & (most_t.lt(t_min) | t_max.lt(least_t));
+        let candidates = candidates & !outside.bits();
+        let mut mask = candidates & certain.bits();
+        if !NEED_T {
+            let inside = sound & t_min.le(least_t) & most_t.le(t_max) & most_t.abs().lt(infinity);
+            if candidates & inside.bits() != 0 {
+                return Some(TriangleHits { mask, t, u, v });
             }
-            let outside = sound & (most_t.lt(t_min) | t_max.lt(least_t));
+        }
+        if mask != candidates {
             let corners = to_arrays([ax, ay, bx, by, cx, cy]);
-            for lane in bits(candidates & !mask & !outside.bits()) {
+            for lane in bits(candidates & !mask) {
                 if let Some([exact_u, exact_v]) = exact_weights(&corners, lane) {
                     u = u.replace(token, lane, exact_u);
                     v = v.replace(token, lane, exact_v);
@@ -157,7 +162,7 @@ impl<'a, V> RayShear<'a, V> {
             t = (az + u * ab + v * ac) * reciprocal + zero;
         }
 
-        let in_range = t_min.le(t) & t.le(t_max) & t.abs().lt(V::splat(token, f32::INFINITY));
+        let in_range = t_min.le(t) & t.le(t_max) & t.abs().lt(infinity);
         mask &= in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,
