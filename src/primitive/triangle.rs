@@ -73,6 +73,8 @@ impl<'a, V> RayShear<'a, V> {
         V: Vector<N>,
     {
         let [kx, ky, kz] = *self.axes;
+        // SAFETY: the axes are those of a prepared ray, a permutation of 0 to 2.
+        unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
         // As arrays: glam's index branches.
         let (origin, direction): (&[f32; 3], &[f32; 3]) =
             (self.ray.origin.as_ref(), self.ray.direction.as_ref());
@@ -111,7 +113,10 @@ impl<'a, V> RayShear<'a, V> {
         let size = determinant.abs();
         let finite = size.lt(V::splat(token, MAX_DETERMINANT));
         let missed = least.lt(zero) & zero.lt(most) & finite;
-        let reciprocal = self.reciprocal[self.axes[2]];
+        let kz = self.axes[2];
+        // SAFETY: as above.
+        unsafe { core::hint::assert_unchecked(kz < 3) };
+        let reciprocal = self.reciprocal[kz];
         let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
         let ahead = V::splat(token, self.ray.t_min).le(last);
         let candidates = lanes & ahead.bits() & !missed.bits();
