@@ -18,7 +18,7 @@
 //!
 //! # What is promised
 //!
-//! 1. The answer of [`reference`], bit for bit: of all primitives hit within the ray's range the one
+//! 1. The answer of [`mod@reference`], bit for bit: of all primitives hit within the ray's range the one
 //!    of least `t`, of equal ones the one of least number. The tree, its width, the processor and the
 //!    number of threads that built it change nothing.
 //! 2. No ray slips through a closed mesh whose triangles share their vertices' positions.

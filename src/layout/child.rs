@@ -77,7 +77,7 @@ impl Link {
     /// 31 bits, nothing sensible comes: the layout's check sees it.
     #[inline]
     pub const fn new<N>(child: Child) -> Self {
-        const { assert!(size_of::<N>() % Self::UNIT == 0) };
+        const { assert!(size_of::<N>().is_multiple_of(Self::UNIT)) };
         match child.kind() {
             ChildKind::Node(index) => {
                 Self((index as u32).wrapping_mul(Self::units::<N>()) & !Child::LEAF)

@@ -1,12 +1,7 @@
-//! The few vector operations the kernels need, once for each instruction set, and the choice between them.
+//! The few vector operations the kernels need, once for each instruction set, and the choice between them
+//! when running.
 //!
-//! A backend is a zero-sized token, [`Portable`] or `Avx2`, that exists only where its instructions do:
-//! vectors are made through a token, so everything built on them is safe code. [`Backend`] is the choice
-//! made when running; [`Backend::run`] is the one place where it is acted on.
-//!
-//! Operations that decide a hit (`+ - * /`, comparisons, [`Vector::select`], [`Vector::permute`]) give the
-//! same bits on every backend. [`Vector::mul_add`], [`Vector::min`] and [`Vector::max`] may differ in
-//! rounding, NaN and the sign of zero; the box test uses them, and is conservative.
+//! Every operation that decides a hit gives the same bits on every backend.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

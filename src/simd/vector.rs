@@ -1,4 +1,9 @@
 //! What a backend offers.
+//!
+//! A backend is a zero-sized token that exists only where its instructions do; vectors are made through a token, so
+//! everything built on them is safe code. Operations that decide a hit (`+ - * /`, comparisons, `select`,
+//! `permute`, `replace`) give the same bits on every backend. `mul_add`, `min` and `max` may differ in rounding,
+//! NaN and the sign of zero; the box test uses them, and is conservative.
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 

@@ -27,11 +27,14 @@ pub fn config(cases: u32) -> Config {
     }
 }
 
+/// A variant's name, and what it answers: closest hit and any hit.
+type Query = (String, Box<dyn Fn(&Ray) -> (Option<Hit>, bool) + Sync>);
+
 /// A scene under every width and on every backend of this machine.
 pub struct Variants {
     positions: Vec<[f32; 3]>,
     indices: Vec<[u32; 3]>,
-    queries: Vec<(String, Box<dyn Fn(&Ray) -> (Option<Hit>, bool) + Sync>)>,
+    queries: Vec<Query>,
 }
 
 impl Variants {
@@ -84,10 +87,7 @@ impl Variants {
     }
 }
 
-fn add_width<N: WideNode + Sync>(
-    queries: &mut Vec<(String, Box<dyn Fn(&Ray) -> (Option<Hit>, bool) + Sync>)>,
-    bvh: Bvh<N, TriangleLeaf, Owned>,
-) {
+fn add_width<N: WideNode + Sync>(queries: &mut Vec<Query>, bvh: Bvh<N, TriangleLeaf, Owned>) {
     for backend in Backend::available() {
         let mut bvh = bvh.clone();
         bvh.set_backend(backend);
