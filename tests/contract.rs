@@ -281,3 +281,23 @@ fn directions_of_every_length() {
         assert_eq!(hit.t, representable, "length 2^{exponent}");
     }
 }
+
+/// Found by fuzzing: a `t` that is zero once it is in the caller's unit was -0 on one backend and 0 on another.
+#[test]
+fn zero_is_positive() {
+    let scene = Variants::new(
+        vec![[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, 0.0, 1.0]],
+        vec![[0, 1, 2]],
+    );
+    for behind in [1e-39, 1e-20, 1.0f32] {
+        for length in [1e30, f32::MAX, 1.0] {
+            for end in [0.0, -0.0] {
+                let ray = Ray::new([0.0, -behind, 0.0], [0.0, -length, 0.0]);
+                let hit = scene.check(&ray.with_range(-f32::MAX, end)).unwrap();
+                assert!(hit.is_some(), "{ray:?}");
+                let t = hit.map_or(0.0, |hit| hit.t);
+                assert!(t < 0.0 || t.to_bits() == 0, "{t:?} for {ray:?}");
+            }
+        }
+    }
+}

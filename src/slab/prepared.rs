@@ -107,10 +107,9 @@ impl<'a> PreparedRay<'a> {
     /// scale take it out of what a float can hold.
     #[inline(always)]
     pub(crate) fn unscaled(&self, t: f32, ray: &Ray) -> f32 {
-        (t * self.unscale)
-            .min(f32::MAX)
-            .max(ray.t_min)
-            .min(ray.t_max)
+        let t = lesser(t * self.unscale, f32::MAX);
+        // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
+        lesser(greater(t, ray.t_min), ray.t_max) + 0.0
     }
 }
 
@@ -157,6 +156,12 @@ static SHEAR_AXES: [[usize; 3]; 6] = [
 #[inline(always)]
 pub(crate) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+/// The lesser of two numbers, neither of them NaN.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// 2 to the power `exponent`, which is within -126 to 127.
