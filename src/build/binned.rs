@@ -125,7 +125,7 @@ impl<I: Input> Task<'_, I> {
     }
 }
 
-fn bounds_of_centers(refs: &[Ref]) -> Bounds {
+pub(super) fn bounds_of_centers(refs: &[Ref]) -> Bounds {
     refs.iter()
         .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()))
 }

@@ -1,14 +1,16 @@
 //! What a caller builds with.
 
 use super::{
-    BinaryTree, BuildError, adopt, binned,
+    BinaryTree, BuildError, adopt,
     collapse::Collapse,
     emit::{Parts, emit},
     group::group,
     input::{Boxes, Input, Triangles},
+    pieces::Pieces,
     rebalance::rebalance,
     refs::Refs,
     reinsertion::{self, Effort},
+    spatial,
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
@@ -19,6 +21,8 @@ use crate::{
 /// least, collapsed to wide nodes at the least cost.
 ///
 /// - The tree: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
+/// - The cuts through large triangles: Stich, Friedrich, Dietrich, "Spatial splits in bounding volume
+///   hierarchies" (2009).
 /// - The moves: Meister and Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018).
 /// - The collapse: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide
 ///   BVHs" (2017).
@@ -34,10 +38,23 @@ use crate::{
 /// assert!(bvh.closest_hit(&Ray::new([0.2, 0.2, -1.0], [0.0, 0.0, 1.0])).is_some());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Builder {
     drop_non_finite: bool,
+    splits: f32,
 }
+
+impl Default for Builder {
+    fn default() -> Self {
+        Self {
+            drop_non_finite: false,
+            splits: SPLITS,
+        }
+    }
+}
+
+/// Room enough: game levels and a kitchen use 0.05 to 0.12. With 0.1, a level that uses 0.12 loses half its gain.
+const SPLITS: f32 = 0.3;
 
 impl Builder {
     /// A builder that refuses primitives that are not finite.
@@ -49,6 +66,18 @@ impl Builder {
     /// and counted, instead of being an error.
     pub fn drop_non_finite(mut self, drop_non_finite: bool) -> Self {
         self.drop_non_finite = drop_non_finite;
+        self
+    }
+
+    /// How many references to triangles may be added by cutting large triangles in pieces, as a fraction of their
+    /// number; 0 or less, or NaN, is none. A triangle in pieces is in more than one leaf.
+    ///
+    /// The default is 0.3, of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
+    /// which takes 6 to 15 % more memory, and up to 9 % off the nodes and leaves that a ray meets.
+    ///
+    /// Only [`build`](Self::build) and [`build_as`](Self::build_as) cut triangles.
+    pub fn splits(mut self, fraction: f32) -> Self {
+        self.splits = fraction;
         self
     }
 
@@ -91,7 +120,7 @@ impl Builder {
     /// # Errors
     /// As [`build`](Self::build).
     pub fn build_binary(&self, mesh: &TriangleMesh) -> Result<BinaryTree, BuildError> {
-        self.binary(&Triangles(mesh)).map(|(tree, _)| tree)
+        self.binary(&Triangles(mesh), 0.0).map(|(tree, ..)| tree)
     }
 
     /// The binary tree over a caller's primitives, before it is collapsed: one a leaf.
@@ -99,7 +128,7 @@ impl Builder {
     /// # Errors
     /// As [`build_primitives`](Self::build_primitives).
     pub fn build_primitives_binary(&self, aabbs: &[Aabb]) -> Result<BinaryTree, BuildError> {
-        self.binary(&Boxes(aabbs)).map(|(tree, _)| tree)
+        self.binary(&Boxes(aabbs), 0.0).map(|(tree, ..)| tree)
     }
 
     /// The hierarchy over a mesh from a binary tree over its triangles, 8 wide.
@@ -149,8 +178,8 @@ impl Builder {
         &self,
         input: &I,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-        let (tree, dropped) = self.binary(input)?;
-        wide(input, tree, dropped, Some(GROUPED))
+        let (tree, pieces, dropped) = self.binary(input, self.splits)?;
+        wide(&pieces, tree, dropped, Some(GROUPED))
     }
 
     fn wide_from<N: WideNode, I: Input>(
@@ -159,16 +188,21 @@ impl Builder {
         tree: &BinaryTree,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
         let refs = Refs::gather(input, self.drop_non_finite)?;
-        let tree = adopt::adopt(input, tree, &refs)?;
-        wide(input, tree, refs.dropped, None)
+        let pieces = Pieces::whole(input);
+        let tree = adopt::adopt(&pieces, tree, &refs)?;
+        wide(&pieces, tree, refs.dropped, None)
     }
 
-    /// The binary tree, and how many primitives were left out of it for not being finite.
-    fn binary<I: Input>(&self, input: &I) -> Result<(BinaryTree, usize), BuildError> {
+    /// The binary tree, what it is over, and how many primitives were left out of it for not being finite.
+    fn binary<'a, I: Input>(
+        &self,
+        input: &'a I,
+        splits: f32,
+    ) -> Result<(BinaryTree, Pieces<'a, I>, usize), BuildError> {
         let refs = Refs::gather(input, self.drop_non_finite)?;
         let dropped = refs.dropped;
-        let tree = binned::build(input, refs);
-        Ok((reinsertion::optimize(tree, SINGLE), dropped))
+        let (tree, pieces) = spatial::build(input, refs, splits);
+        Ok((reinsertion::optimize(tree, SINGLE), pieces, dropped))
     }
 }
 

@@ -92,6 +92,15 @@ fn fill<I: Input>(
         let first = primitives.len();
         primitives.extend_from_slice(&order[range.clone()]);
         primitives[first..].sort_unstable();
+        // Pieces of a triangle that have met again.
+        let mut end = first;
+        for place in first..primitives.len() {
+            if place == first || primitives[place] != primitives[place - 1] {
+                primitives[end] = primitives[place];
+                end += 1;
+            }
+        }
+        primitives.truncate(end);
         ends.push(primitives.len());
     }
     let leaf = |(index, ends): (usize, &[usize])| {

@@ -34,14 +34,23 @@ impl Group {
         len: 0,
     };
 
-    fn new(node: usize, aabb: Aabb, primitives: &[u32]) -> Self {
-        let mut ids = [0; MAX_LEAF];
-        ids[..primitives.len()].copy_from_slice(primitives);
-        Self {
+    fn new(node: usize, aabb: Aabb, primitives: impl IntoIterator<Item = u32>) -> Self {
+        let mut group = Self {
             node,
             aabb,
-            ids,
-            len: primitives.len(),
+            ..Self::NONE
+        };
+        group.add(primitives);
+        group
+    }
+
+    /// Adds primitives, once each.
+    fn add(&mut self, primitives: impl IntoIterator<Item = u32>) {
+        for id in primitives {
+            if !self.ids().contains(&id) {
+                self.ids[self.len] = id;
+                self.len += 1;
+            }
         }
     }
 
@@ -52,8 +61,7 @@ impl Group {
     fn join(&self, other: &Self) -> Self {
         let mut joined = *self;
         joined.aabb = self.aabb.join(other.aabb);
-        joined.len += other.len;
-        joined.ids[self.len..joined.len].copy_from_slice(other.ids());
+        joined.add(other.ids().iter().copied());
         joined
     }
 }
@@ -124,7 +132,8 @@ fn groups<I: Input, const W: usize>(
 ) -> Vec<Group> {
     let mut groups = Vec::new();
     let leaf = |node: usize| {
-        let primitives = &tree.order()[collapse.leaf(node)?];
+        let numbers = &tree.order()[collapse.leaf(node)?];
+        let primitives = numbers.iter().map(|&number| input.primitive(number));
         Some(Group::new(node, tree.nodes()[node].aabb, primitives))
     };
     let mut todo = Vec::new();

@@ -28,6 +28,8 @@ pub(super) trait Input: Sync {
     const MAX_LEAF: usize;
     /// How many times the cost of two leaves one may have for which they are given up.
     const JOINED: f32;
+    /// Whether they are triangles, which can be cut into pieces.
+    const CAN_SPLIT: bool;
 
     /// How many there are.
     fn len(&self) -> usize;
@@ -35,6 +37,10 @@ pub(super) trait Input: Sync {
     fn verdict(&self, id: u32) -> Verdict;
     /// The exact box of a primitive that is kept.
     fn aabb(&self, id: u32) -> Aabb;
+    /// Its corners, if it is a triangle.
+    fn triangle(&self, id: u32) -> Option<[Vec3; 3]>;
+    /// The primitive that a number in a tree stands for.
+    fn primitive(&self, number: u32) -> u32;
     /// Whether these primitives, no more than [`Input::MAX_LEAF`], can be one leaf.
     fn fits(&self, ids: &[u32]) -> bool;
     /// The cost of a leaf of `count`.
@@ -69,6 +75,7 @@ impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
     const JOINED: f32 = cost::TRIANGLES_JOINED;
+    const CAN_SPLIT: bool = true;
 
     fn len(&self) -> usize {
         self.0.len()
@@ -94,6 +101,16 @@ impl Input for Triangles<'_> {
     #[inline]
     fn aabb(&self, id: u32) -> Aabb {
         triangle_aabb(self.corners(id))
+    }
+
+    #[inline]
+    fn triangle(&self, id: u32) -> Option<[Vec3; 3]> {
+        Some(self.corners(id))
+    }
+
+    #[inline]
+    fn primitive(&self, number: u32) -> u32 {
+        number
     }
 
     /// Few enough distinct positions. Most repeats are seen by number.
@@ -158,6 +175,7 @@ impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
     const JOINED: f32 = 1.0;
+    const CAN_SPLIT: bool = false;
 
     fn len(&self) -> usize {
         self.0.len()
@@ -179,6 +197,15 @@ impl Input for Boxes<'_> {
     fn aabb(&self, id: u32) -> Aabb {
         let Aabb { min, max } = self.0[id as usize];
         Aabb::new(min + 0.0, max + 0.0)
+    }
+
+    fn triangle(&self, _: u32) -> Option<[Vec3; 3]> {
+        None
+    }
+
+    #[inline]
+    fn primitive(&self, number: u32) -> u32 {
+        number
     }
 
     fn fits(&self, _: &[u32]) -> bool {

@@ -60,7 +60,9 @@ impl Ref {
     }
 
     #[inline]
-    fn scaled(self, scale: f32x4) -> Self {
+    pub fn scaled(self, scale: f32) -> Self {
+        // A number is no length.
+        let scale = f32x4::new([scale, scale, scale, 1.0]);
         Self {
             min: self.min * scale,
             max: self.max * scale,
@@ -107,6 +109,7 @@ impl Bounds {
 pub(super) struct Refs {
     pub refs: Vec<Ref>,
     pub dropped: usize,
+    scale: f32,
 }
 
 /// What a run of primitives came to.
@@ -156,12 +159,19 @@ impl Refs {
         refs.truncate(kept);
 
         let scale = Measure::new(largest).scale();
-        // A number is no length.
-        let scale = f32x4::new([scale, scale, scale, 1.0]);
         for r in &mut refs {
             *r = r.scaled(scale);
         }
-        Ok(Self { refs, dropped })
+        Ok(Self {
+            refs,
+            dropped,
+            scale,
+        })
+    }
+
+    /// What boxes are scaled by: a power of two.
+    pub fn scale(&self) -> f32 {
+        self.scale
     }
 }
 

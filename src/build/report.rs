@@ -9,8 +9,11 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BuildReport {
-    /// Primitives in leaves, once for every leaf that has them.
+    /// Primitives in leaves, each counted once.
     pub primitives: usize,
+    /// Primitives in leaves, once for every leaf that has them: more than there are where large triangles
+    /// were cut into pieces.
+    pub references: usize,
     /// Primitives left out because they are not finite.
     pub dropped: usize,
     /// Wide nodes.
@@ -27,6 +30,7 @@ impl fmt::Display for BuildReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             primitives,
+            references,
             dropped,
             nodes,
             leaves,
@@ -37,6 +41,9 @@ impl fmt::Display for BuildReport {
             f,
             "{primitives} primitives in {leaves} leaves under {nodes} nodes, {bytes} bytes, SAH cost {sah_cost:.2}"
         )?;
+        if references > primitives {
+            write!(f, "; {references} references")?;
+        }
         if *dropped > 0 {
             write!(f, "; {dropped} not finite and left out")?;
         }
@@ -62,8 +69,12 @@ fn report<N: WideNode, L: Leaf>(
     bvh: &Bvh<N, L, Owned>,
     leaf_cost: impl Fn(usize) -> f32,
 ) -> BuildReport {
+    let mut primitives = bvh.primitives().to_vec();
+    primitives.sort_unstable();
+    primitives.dedup();
     BuildReport {
-        primitives: bvh.primitives().len(),
+        primitives: primitives.len(),
+        references: bvh.primitives().len(),
         dropped: bvh.dropped(),
         nodes: bvh.nodes().len(),
         leaves: bvh.leaves().len(),

@@ -128,6 +128,11 @@ impl Cut {
         grid.cheapest(&bins)
     }
 
+    /// Whether a reference is left of the cut.
+    pub fn is_left(&self, r: &Ref) -> bool {
+        self.grid.bins(r.center2())[self.axis] < self.bin
+    }
+
     /// Sorts `refs` into those left and right of the cut: how many are left, and the bounds of either
     /// side's twice-centers.
     pub fn partition(&self, refs: &mut [Ref]) -> (usize, Bounds, Bounds) {

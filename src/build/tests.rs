@@ -114,12 +114,80 @@ fn check_bvh<N: WideNode, L: Leaf>(
     assert_eq!(*bvh.bounds(), root);
 }
 
+/// Every one of `expected` is in a leaf, once each; boxes are the least around those below; every point of a triangle
+/// is in the box of a leaf that has it, and so in those above.
+fn check_pieces<N: WideNode>(
+    bvh: &Bvh<N, TriangleLeaf, Owned>,
+    expected: &[u32],
+    mesh: &TriangleMesh,
+) {
+    let mut seen = bvh.primitives().to_vec();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen, expected);
+    assert_eq!(bvh.report().primitives, expected.len());
+    assert_eq!(bvh.report().references, bvh.primitives().len());
+
+    let mut boxes = vec![Aabb::EMPTY; bvh.nodes().len()];
+    let mut leaf_boxes = vec![*bvh.bounds(); bvh.leaves().len()];
+    for (index, node) in bvh.nodes().iter().enumerate().rev() {
+        for lane in 0..N::WIDTH {
+            let child = node.child(lane);
+            let aabb = node.child_aabb(lane);
+            match child.kind() {
+                ChildKind::Empty => continue,
+                ChildKind::Node(node) => assert_eq!(aabb, boxes[node]),
+                ChildKind::Leaf(leaf) => leaf_boxes[leaf] = aabb,
+            }
+            boxes[index] = boxes[index].join(aabb);
+        }
+    }
+    let corners = |id: u32| mesh.triangle(id as usize).unwrap();
+    let all = expected.iter().flat_map(|&id| corners(id));
+    assert_eq!(*bvh.bounds(), Aabb::from_points(all));
+
+    let mut parts = vec![Vec::new(); mesh.len()];
+    for (leaf, aabb) in bvh.leaves().iter().zip(&leaf_boxes) {
+        let places = leaf.primitives();
+        let ids = &bvh.primitives()[places.start as usize..places.end as usize];
+        assert!(ids.is_sorted_by(|a, b| a < b));
+        for &id in ids {
+            parts[id as usize].push(*aabb);
+        }
+    }
+    let mut random = Random(31);
+    for &id in expected {
+        let [a, b, c] = corners(id).map(|corner| corner.as_dvec3());
+        // The sample itself is rounded.
+        let slack = a.abs().max(b.abs()).max(c.abs()).max_element() * 1e-15;
+        let samples = if parts[id as usize].len() > 1 { 200 } else { 4 };
+        for sample in 0..samples {
+            let (mut v, mut w) = (f64::from(random.unit()), f64::from(random.unit()));
+            if v + w > 1.0 {
+                (v, w) = (1.0 - v, 1.0 - w);
+            }
+            if sample % 8 == 0 {
+                w = 0.0;
+            }
+            let p = a * (1.0 - v - w) + b * v + c * w;
+            let is_in = |aabb: &Aabb| {
+                let (min, max) = (aabb.min.as_dvec3() - slack, aabb.max.as_dvec3() + slack);
+                p.cmpge(min).all() && p.cmple(max).all()
+            };
+            assert!(parts[id as usize].iter().any(is_in), "{id}: {p}");
+        }
+    }
+}
+
 /// Both widths, and the way over a binary tree, of triangles that all are kept.
 fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
     let mesh = TriangleMesh::new(positions, indices).unwrap();
     let all: Vec<u32> = (0..indices.len() as u32).collect();
     let aabb = |id: u32| Aabb::from_points(mesh.triangle(id as usize).unwrap());
-    let builder = Builder::new();
+    let builder = Builder::new().splits(0.0);
+    let cutting = Builder::new().splits(2.0);
+    check_pieces(&cutting.build(&mesh).unwrap(), &all, &mesh);
+    check_pieces(&cutting.build_as::<Node4>(&mesh).unwrap(), &all, &mesh);
     let bvh = builder.build(&mesh).unwrap();
     check_bvh(&bvh, &all, aabb);
     check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
@@ -278,7 +346,9 @@ fn numbers_at_the_ends_of_their_range() {
             .collect();
         let indices = soup(&positions);
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-        let bvh = Builder::new().build(&mesh).unwrap();
+        let pieces = Builder::new().splits(2.0).build(&mesh).unwrap();
+        let bvh = Builder::new().splits(0.0).build(&mesh).unwrap();
+        check_pieces(&pieces, &bvh.sorted_primitives(), &mesh);
         check_bvh(&bvh, &bvh.sorted_primitives(), |id| {
             Aabb::from_points(mesh.triangle(id as usize).unwrap())
         });
@@ -295,6 +365,47 @@ fn numbers_at_the_ends_of_their_range() {
         .map(|i| [0, 1, 2].map(|axis| [f32::MAX, -f32::MAX, 1.0][(i + axis + i / 3) % 3]))
         .collect();
     check_mesh(&positions, &soup(&positions));
+}
+
+/// Triangles all over the unit cube, each as long as a third of it and one in a hundred as wide.
+fn needles(count: usize, seed: u64) -> Vec<Position> {
+    let mut random = Random(seed);
+    let mut positions = Vec::new();
+    for triangle in 0..count {
+        let p = random.point();
+        let q = p + 0.3 * random.point();
+        let width = if triangle % 100 == 0 { 0.3 } else { 0.01 };
+        positions.extend([p, q, q + width * random.point()].map(|p| p.to_array()));
+    }
+    positions
+}
+
+#[test]
+fn large_triangles_are_cut() {
+    for scale in [1.0, f32::MAX / 2.0, 1e-38, 1e-43] {
+        let positions: Vec<_> = needles(5000, 37)
+            .iter()
+            .map(|p| p.map(|x| x * scale))
+            .collect();
+        let indices = soup(&positions);
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let whole = Builder::new().splits(0.0).build(&mesh).unwrap();
+        let kept = whole.sorted_primitives();
+        for fraction in [0.1, 0.5, f32::INFINITY] {
+            let cut = Builder::new().splits(fraction).build(&mesh).unwrap();
+            check_pieces(&cut, &kept, &mesh);
+            let report = cut.report();
+            let most = (kept.len() as f32 * (1.0 + fraction)) as usize;
+            assert!(report.references <= most);
+            assert!(scale < 1e-40 || report.references > report.primitives);
+        }
+        for fraction in [-1.0, f32::NAN] {
+            assert_same(
+                &whole,
+                &Builder::new().splits(fraction).build(&mesh).unwrap(),
+            );
+        }
+    }
 }
 
 #[test]
@@ -357,10 +468,11 @@ fn trees_of_others() {
         let tree = BinaryTree::new(nodes, order).unwrap();
         Builder::new().build_from_tree(&mesh, &tree)
     };
-    // Children before their parents, a leaf of several, one listed twice, a place that is nobody's.
+    // Children before their parents, a leaf of several, two listed twice, a place that is nobody's. All are few
+    // enough for one leaf, which has each once.
     let nodes = vec![node(3, 0), node(0, 3), node(4, 1), node(1, 0), node(5, 2)];
     let bvh = build(nodes.clone(), vec![3, 1, 0, 9, 2, 1, 2]).unwrap();
-    check_bvh(&bvh, &[0, 1, 1, 2, 2, 3], |id| {
+    check_bvh(&bvh, &[0, 1, 2, 3], |id| {
         Aabb::from_points(mesh.triangle(id as usize).unwrap())
     });
     assert_eq!(
@@ -424,7 +536,8 @@ fn trees_of_any_shape_fit_the_stack() {
 #[cfg(feature = "rayon")]
 #[test]
 fn the_same_on_any_number_of_threads() {
-    let positions = dust(150_000, 29);
+    let mut positions = dust(150_000, 29);
+    positions.extend(needles(10_000, 41));
     let indices = soup(&positions);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
     let build = |threads: usize| {
