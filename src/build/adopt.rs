@@ -5,10 +5,11 @@ use super::{
     binary::{BinaryNode, BinaryTree},
     binned,
     input::Input,
-    lay_out::{Part, lay_out},
+    lay_out::{Part, below_inner, lay_out},
     refs::{Ref, Refs},
 };
 use crate::geometry::TriangleMesh;
+use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
 
 /// `tree` without the primitives that are not in `refs`, its leaves split down to single primitives, its
@@ -35,20 +36,11 @@ pub(super) fn adopt<I: Input>(
 
     let mut order = Vec::with_capacity(total);
     let nodes = lay_out(total, 0, |mut index, below| {
-        // Past nodes of which one side is left.
         while !tree.nodes()[index].is_leaf() {
-            let [left, right] = tree.nodes()[index].children();
-            index = match (counts[left], counts[right]) {
-                (0, _) => right,
-                (_, 0) => left,
-                (left_leaves, _) => {
-                    return Part::Inner {
-                        left,
-                        right,
-                        left_leaves,
-                    };
-                }
-            };
+            match below_inner(tree, &counts, index) {
+                ControlFlow::Continue(only) => index = only,
+                ControlFlow::Break(both) => return both,
+            }
         }
         let leaf = listed(tree, &tree.nodes()[index]);
         let mut kept: Vec<_> = leaf.filter_map(|&id| places.of(&refs.refs, id)).collect();

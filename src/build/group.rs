@@ -8,9 +8,10 @@ use super::{
     collapse::Collapse,
     cost::Measure,
     input::Input,
-    lay_out::{Part, lay_out},
+    lay_out::{Part, below_inner, lay_out},
 };
 use crate::geometry::Aabb;
+use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
 
 /// The most primitives that a leaf of any kind has.
@@ -105,19 +106,10 @@ pub(super) fn group<I: Input, const W: usize>(
                     count: group.len as u32,
                 });
             }
-            // Past nodes of which one side is left.
-            let [left, right] = tree.nodes()[index].children();
-            index = match (counts[left], counts[right]) {
-                (0, _) => right,
-                (_, 0) => left,
-                (left_leaves, _) => {
-                    return Part::Inner {
-                        left,
-                        right,
-                        left_leaves,
-                    };
-                }
-            };
+            match below_inner(tree, &counts, index) {
+                ControlFlow::Continue(only) => index = only,
+                ControlFlow::Break(both) => return both,
+            }
         }
     });
     BinaryTree::new_unchecked(nodes, order)

@@ -4,9 +4,10 @@
 //! node comes before those below it; what is below it is one range; and the leaves, from left to right, have
 //! the tree's order of primitives from its beginning to its end.
 
-use super::binary::BinaryNode;
+use super::binary::{BinaryNode, BinaryTree};
 use crate::geometry::Aabb;
 use bytemuck::Zeroable;
+use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
 
 /// What goes into a place of a new tree. `T` is whatever tells the parts of the old one apart.
@@ -22,6 +23,25 @@ pub(super) enum Part<T> {
     },
     /// A node and all below it, in order; the place of the second is the one that was given.
     Tree(Vec<BinaryNode>),
+}
+
+/// What an inner node of `tree` is over in a new tree, `counts` being the new leaves below each node: both its
+/// sides, or the only one that has any, which takes its place.
+pub(super) fn below_inner(
+    tree: &BinaryTree,
+    counts: &[usize],
+    index: usize,
+) -> ControlFlow<Part<usize>, usize> {
+    let [left, right] = tree.nodes()[index].children();
+    match (counts[left], counts[right]) {
+        (0, _) => ControlFlow::Continue(right),
+        (_, 0) => ControlFlow::Continue(left),
+        (left_leaves, _) => ControlFlow::Break(Part::Inner {
+            left,
+            right,
+            left_leaves,
+        }),
+    }
 }
 
 /// The nodes of a tree of so many leaves, more than none. `part` is asked for every part from left to right, and

@@ -60,16 +60,15 @@ impl<'a> PreparedRay<'a> {
         // Not by glam's index, which branches.
         let negative = ray.direction.as_ref()[z].is_sign_negative();
         let axes = &SHEAR_AXES[2 * z + usize::from(negative)];
-        let (scale, unscale) = if (pow2(-23)..pow2(24)).contains(&largest) {
+        if (pow2(-23)..pow2(24)).contains(&largest) {
             return Some(Self {
                 ray,
                 axes,
                 scale: 1.0,
                 unscale: 1.0,
             });
-        } else {
-            scale_ray(ray, largest, scaled)
-        };
+        }
+        let (scale, unscale) = scale_ray(ray, largest, scaled);
         Some(Self {
             ray: scaled,
             axes,
