@@ -5,7 +5,7 @@ mod common;
 use common::{Variants, any_float, config, coordinate, point, point_on, soup, target};
 use glam::Vec3;
 use proptest::prelude::*;
-use wide_bvh::geometry::Ray;
+use wide_bvh::{build::Builder, geometry::Ray};
 
 /// How a ray relates to the scene: `pick` chooses a triangle or a vertex of it.
 #[derive(Clone, Debug)]
@@ -300,4 +300,38 @@ fn zero_is_positive() {
             }
         }
     }
+}
+
+/// Long triangles that cross one another, enough of them for the builder to cut some.
+#[test]
+fn triangles_in_pieces() {
+    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut near = |centre: Vec3, size: f32| {
+        (centre + size * Vec3::from([0; 3].map(|_| random.f32() - 0.5))).to_array()
+    };
+    let positions: Vec<_> = (0..3000)
+        .flat_map(|i| {
+            let centre = Vec3::from(near(Vec3::ZERO, 20.0));
+            let far = Vec3::from(near(centre, if i % 3 == 0 { 8.0 } else { 0.5 }));
+            [near(centre, 0.1), near(centre, 0.1), near(far, 0.1)]
+        })
+        .collect();
+    let indices = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let rays: Vec<_> = (0..500)
+        .map(|i| {
+            let origin = Vec3::from(near(Vec3::ZERO, 25.0));
+            let target = match i % 2 {
+                0 => Vec3::from(positions[(i * 17) % positions.len()]),
+                _ => Vec3::from(near(Vec3::ZERO, 15.0)),
+            };
+            Ray::new(origin, target - origin)
+        })
+        .collect();
+    let scene = Variants::new(positions, indices);
+    let report = Builder::new().build(&scene.mesh()).unwrap().report();
+    assert!(report.references > report.primitives, "{report:?}");
+    let hits = rays
+        .iter()
+        .filter(|ray| scene.check(ray).unwrap().is_some());
+    assert!(hits.count() > 100);
 }
