@@ -1,7 +1,7 @@
 //! The choice of instruction set when running.
 
 #[cfg(target_arch = "x86_64")]
-use super::Avx2;
+use super::{Avx2, Avx512};
 use super::{Portable, Simd};
 use core::fmt;
 
@@ -17,6 +17,8 @@ enum Kind {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
 
 /// Something to be done with vectors, whatever the backend.
@@ -34,25 +36,32 @@ impl Backend {
     /// The fastest backend of this processor.
     #[inline]
     pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::detect() {
-            return Self(Kind::Avx2(avx2));
-        }
-        Self::PORTABLE
+        Self::available().next().unwrap_or(Self::PORTABLE)
     }
 
     /// Every backend of this processor, the fastest first.
+    #[inline]
     pub fn available() -> impl Iterator<Item = Self> {
-        let best = Self::detect();
-        core::iter::once(best).chain((best != Self::PORTABLE).then_some(Self::PORTABLE))
+        [
+            #[cfg(target_arch = "x86_64")]
+            Avx512::detect().map(Kind::Avx512),
+            #[cfg(target_arch = "x86_64")]
+            Avx2::detect().map(Kind::Avx2),
+            Some(Kind::Portable),
+        ]
+        .into_iter()
+        .flatten()
+        .map(Self)
     }
 
-    /// A short name: `portable` or `avx2`.
+    /// A short name: `portable`, `avx2` or `avx512`.
     pub const fn name(self) -> &'static str {
         match self.0 {
             Kind::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Kind::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512(_) => "avx512",
         }
     }
 
@@ -64,6 +73,9 @@ impl Backend {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the token says that the processor has these instructions.
             Kind::Avx2(avx2) => unsafe { run_avx2(operation, avx2) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Kind::Avx512(avx512) => unsafe { run_avx512(operation, avx512) },
         }
     }
 }
@@ -72,6 +84,12 @@ impl Backend {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
 fn run_avx2<O: Operation>(operation: O, token: Avx2) -> O::Output {
     operation.run(token)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+fn run_avx512<O: Operation>(operation: O, token: Avx512) -> O::Output {
+    operation.run(token.vectors())
 }
 
 impl Default for Backend {

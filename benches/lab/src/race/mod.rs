@@ -54,9 +54,19 @@ pub struct Args {
     /// Meshes to race over (PLY, OBJ, binary glTF); without any, a scene made by code
     #[arg(long, value_name = "FILE", num_args = 1..)]
     scenes: Vec<PathBuf>,
+    /// Race only the engines whose names contain one of these
+    #[arg(long, value_name = "TEXT", num_args = 1..)]
+    engines: Vec<String>,
     /// Few rays and rounds: minutes become seconds, and the figures rough
     #[arg(long)]
     quick: bool,
+}
+
+impl Args {
+    /// Whether the engine of this name races.
+    fn chosen(&self, name: &str) -> bool {
+        self.engines.is_empty() || self.engines.iter().any(|text| name.contains(text.as_str()))
+    }
 }
 
 /// How much to measure.
@@ -106,7 +116,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut out = io::stdout();
     writeln!(out, "{}", engines::about_embree()?)?;
     for scene in &scenes {
-        let engines = engines::all(&TriangleMesh::new(&scene.positions, &scene.indices)?)?;
+        let mut engines = engines::all(&TriangleMesh::new(&scene.positions, &scene.indices)?)?;
+        engines.retain(|engine| args.chosen(engine.name()));
         let results = race(scene, &engines, &effort)?;
         write!(out, "\n{}", table::of_scene(&results))?;
         records.extend(results);

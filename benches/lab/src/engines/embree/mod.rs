@@ -12,7 +12,7 @@ use ffi::{Api, Context3, Handle, Queries, RayHit};
 use libloading::Library;
 use std::{
     error::Error,
-    ffi::{c_int, c_void},
+    ffi::{CStr, c_int, c_void},
     fmt,
     ptr::null_mut,
     sync::{
@@ -46,7 +46,7 @@ static API: LazyLock<Option<Api>> = LazyLock::new(|| {
 /// Embree cannot make a device.
 pub fn about() -> Result<String, EmbreeError> {
     match &*API {
-        Some(api) => Ok(Device::new(api)?.describe()),
+        Some(api) => Ok(Device::new(api, c"threads=1")?.describe()),
         None => Ok(HOW_TO_INSTALL.to_owned()),
     }
 }
@@ -54,7 +54,8 @@ pub fn about() -> Result<String, EmbreeError> {
 const HOW_TO_INSTALL: &str = "Embree is not installed, so the race goes on without it: it takes \
     libembree4 or libembree3 (Debian and Ubuntu: apt-get install libembree-dev)";
 
-/// Both modes; none without Embree.
+/// Its modes: ordinary and robust, and where it would use AVX-512 the ordinary one on AVX2 as well. None without
+/// Embree.
 ///
 /// # Errors
 /// Embree cannot make a device or a scene.
@@ -62,22 +63,27 @@ pub fn engines(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, EmbreeEr
     let Some(api) = &*API else {
         return Ok(Vec::new());
     };
-    [
-        ("embree HIGH", ffi::SCENE_FLAG_NONE),
-        ("embree HIGH robust", ffi::SCENE_FLAG_ROBUST),
-    ]
-    .into_iter()
-    .map(|(name, flags)| {
-        let device = Device::new(api)?;
-        let (scene, time) = timed(|| Scene::new(device, mesh, flags));
-        let scene = scene?;
-        let built = Built {
-            time,
-            bytes: scene.device.bytes(),
-        };
-        Ok(Box::new(Embree { name, built, scene }) as Box<dyn Engine>)
-    })
-    .collect()
+    let mut modes = vec![
+        ("embree HIGH", c"threads=1", ffi::SCENE_FLAG_NONE),
+        ("embree HIGH robust", c"threads=1", ffi::SCENE_FLAG_ROBUST),
+    ];
+    if Device::new(api, c"threads=1")?.has_avx512() {
+        let config = c"threads=1,isa=avx2";
+        modes.push(("embree HIGH avx2", config, ffi::SCENE_FLAG_NONE));
+    }
+    modes
+        .into_iter()
+        .map(|(name, config, flags)| {
+            let device = Device::new(api, config)?;
+            let (scene, time) = timed(|| Scene::new(device, mesh, flags));
+            let scene = scene?;
+            let built = Built {
+                time,
+                bytes: scene.device.bytes(),
+            };
+            Ok(Box::new(Embree { name, built, scene }) as Box<dyn Engine>)
+        })
+        .collect()
 }
 
 /// What Embree said went wrong: an `RTCError`.
@@ -208,9 +214,9 @@ struct Device {
 }
 
 impl Device {
-    fn new(api: &'static Api) -> Result<Self, EmbreeError> {
+    fn new(api: &'static Api, config: &CStr) -> Result<Self, EmbreeError> {
         // SAFETY: the configuration is a C string.
-        let handle = unsafe { (api.new_device)(c"threads=1".as_ptr()) };
+        let handle = unsafe { (api.new_device)(config.as_ptr()) };
         if handle.is_null() {
             // SAFETY: without a device, the error is the thread's.
             return Err(EmbreeError(unsafe { (api.get_device_error)(null_mut()) }));
@@ -230,12 +236,20 @@ impl Device {
         usize::try_from(self.allocated.load(Ordering::Relaxed)).unwrap_or(0)
     }
 
+    fn property(&self, property: c_int) -> isize {
+        // SAFETY: the device is there.
+        unsafe { (self.api.get_device_property)(self.handle, property) }
+    }
+
+    fn has_avx512(&self) -> bool {
+        let [_, sixteen] = ffi::PROPERTY_NATIVE_RAY;
+        self.property(sixteen) > 0
+    }
+
     /// The version, and the widest vectors it uses here.
     fn describe(&self) -> String {
-        // SAFETY: the device is there.
-        let property = |property| unsafe { (self.api.get_device_property)(self.handle, property) };
-        let [major, minor, patch] = ffi::PROPERTY_VERSION.map(property);
-        let vectors = match ffi::PROPERTY_NATIVE_RAY.map(|width| property(width) > 0) {
+        let [major, minor, patch] = ffi::PROPERTY_VERSION.map(|part| self.property(part));
+        let vectors = match ffi::PROPERTY_NATIVE_RAY.map(|width| self.property(width) > 0) {
             [_, true] => "AVX-512",
             [true, false] => "AVX or AVX2",
             [false, false] => "4-wide vectors",
