@@ -1,8 +1,8 @@
 //! Leaves: a few triangles that share vertices, or a few of a caller's primitives.
 
 use crate::{
-    primitive::triangle::{RayShear, TriangleHits},
-    simd::{Simd, Vector},
+    primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
+    simd::{Lanes, Simd, Vector},
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, ops::Range};
@@ -79,13 +79,32 @@ impl TriangleLeaf {
         ray: &RayShear<'_, T::F32x8>,
         t_max: f32,
     ) -> Option<TriangleHits<T::F32x8>> {
+        let (corners, edges) = self.edges(token, ray);
+        if edges.candidates == 0 {
+            return None;
+        }
+        let t_max = T::F32x8::splat(token, t_max);
+        ray.along(token)
+            .test::<8, NEED_T>(token, corners, edges, t_max)
+    }
+
+    /// Its triangles' corners as the ray sees them, and which of them the ray may hit: what the rest of the test works on.
+    #[inline(always)]
+    pub(crate) fn edges<T: Simd>(
+        &self,
+        token: T,
+        ray: &RayShear<'_, T::F32x8>,
+    ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
         let vertices = ray.shear(token, &self.vertices);
         let corners = [
             self.corners_of(vertices.x),
             self.corners_of(vertices.y),
             self.corners_of(vertices.z),
         ];
-        ray.test::<8, NEED_T>(token, corners, self.lanes(), T::F32x8::splat(token, t_max))
+        (
+            corners,
+            ray.along(token).edges::<8>(token, corners, self.lanes()),
+        )
     }
 
     /// A number of each vertex as that of each triangle's first, second and third corner.
@@ -102,6 +121,12 @@ impl TriangleLeaf {
     #[inline(always)]
     pub(crate) fn first(&self) -> usize {
         self.first as usize
+    }
+
+    /// How many triangles there are.
+    #[inline(always)]
+    pub(crate) fn count(&self) -> usize {
+        self.count as usize
     }
 
     /// A bit for each triangle there is.

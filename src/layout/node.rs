@@ -3,10 +3,11 @@
 use super::{Child, Link};
 use crate::{
     geometry::{Aabb, Ray},
-    simd::{Simd, Vector},
-    slab::{Planes, RaySlabs},
+    simd::{Lanes, Simd, Vector},
+    slab::{BundleSlabs, NarrowSlabs, Planes, RaySlabs},
 };
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use sealed::Sealed;
 
 /// A node of some width and precision: what the one traversal needs of it.
@@ -18,7 +19,7 @@ pub trait WideNode: Pod + Sealed {
     type Slabs<S: Simd>: Copy;
     /// A float a child, in a backend's vector.
     #[doc(hidden)]
-    type Lanes<S: Simd>: Copy;
+    type Lanes<S: Simd>: Lanes<Token = S>;
 
     /// A node of up to [`WIDTH`](Self::WIDTH) children with their bounds, in the lanes' order; more are
     /// left out.
@@ -44,21 +45,33 @@ pub trait WideNode: Pod + Sealed {
         reciprocal: [S::F32x8; 3],
         bounds: &Aabb,
     ) -> Self::Slabs<S>;
+    /// As [`test`](Self::test), for a bundle of rays.
     #[doc(hidden)]
-    fn splat<S: Simd>(token: S, x: f32) -> Self::Lanes<S>;
+    fn test_bundle<S: Simd>(
+        &self,
+        token: S,
+        slabs: &BundleSlabs,
+        t_max: Self::Lanes<S>,
+    ) -> (Self::Lanes<S>, Self::Lanes<S>);
+    /// The planes of a child's box that rays of this direction meet first, and those they meet last.
+    #[doc(hidden)]
+    fn child_planes(&self, lane: usize, direction: Vec3) -> [[f32; 3]; 2];
+    /// The same from single numbers.
+    #[doc(hidden)]
+    fn widen<S: Simd>(token: S, slabs: &NarrowSlabs) -> Self::Slabs<S>;
+    #[doc(hidden)]
+    fn link_lanes<S: Simd>(&self, token: S) -> Self::Lanes<S>;
     /// By how much the greatest `t` is to be raised for [`test`](Self::test).
     #[doc(hidden)]
     fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32;
-    /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
+    /// Which children the ray may meet up to `t_max`, as a comparison's outcome, and from which `t` on.
     #[doc(hidden)]
     fn test<S: Simd>(
         &self,
         token: S,
         slabs: &Self::Slabs<S>,
         t_max: Self::Lanes<S>,
-    ) -> (u32, Self::Lanes<S>);
-    #[doc(hidden)]
-    fn lanes<S: Simd>(lanes: &Self::Lanes<S>) -> impl AsRef<[f32]>;
+    ) -> (Self::Lanes<S>, Self::Lanes<S>);
 }
 
 mod sealed {
@@ -133,8 +146,39 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn splat<S: Simd>(token: S, x: f32) -> Self::Lanes<S> {
-                S::$vector::splat(token, x)
+            fn test_bundle<S: Simd>(
+                &self,
+                token: S,
+                slabs: &BundleSlabs,
+                t_max: Self::Lanes<S>,
+            ) -> (Self::Lanes<S>, Self::Lanes<S>) {
+                slabs.test(token, &self.planes, t_max)
+            }
+
+            #[inline(always)]
+            fn child_planes(&self, lane: usize, direction: Vec3) -> [[f32; 3]; 2] {
+                let lane = lane % $width;
+                let [[x0, x1], [y0, y1], [z0, z1]] = &self.planes;
+                let planes = [x0[lane], x1[lane], y0[lane], y1[lane], z0[lane], z1[lane]];
+                let [x, y, z] = [
+                    (direction.x.to_bits() >> 31) as usize,
+                    (direction.y.to_bits() >> 31) as usize,
+                    (direction.z.to_bits() >> 31) as usize,
+                ];
+                [
+                    [planes[x], planes[2 + y], planes[4 + z]],
+                    [planes[x ^ 1], planes[2 + (y ^ 1)], planes[4 + (z ^ 1)]],
+                ]
+            }
+
+            #[inline(always)]
+            fn widen<S: Simd>(token: S, slabs: &NarrowSlabs) -> Self::Slabs<S> {
+                slabs.widen(token)
+            }
+
+            #[inline(always)]
+            fn link_lanes<S: Simd>(&self, token: S) -> Self::Lanes<S> {
+                S::$vector::load(token, bytemuck::cast_ref(&self.links))
             }
 
             #[inline(always)]
@@ -148,13 +192,8 @@ macro_rules! impl_wide_node {
                 token: S,
                 slabs: &Self::Slabs<S>,
                 t_max: Self::Lanes<S>,
-            ) -> (u32, Self::Lanes<S>) {
+            ) -> (Self::Lanes<S>, Self::Lanes<S>) {
                 slabs.test(token, &self.planes, t_max)
-            }
-
-            #[inline(always)]
-            fn lanes<S: Simd>(lanes: &Self::Lanes<S>) -> impl AsRef<[f32]> {
-                lanes.to_array()
             }
         }
     };

@@ -12,9 +12,11 @@
 //!   triangles seen nearly edge-on. So the error of `t` is bounded whatever the triangle (see
 //!   [`slab`](crate::slab)).
 
+use core::ops::{Mul, Sub};
+
 use crate::{
     geometry::Ray,
-    simd::Vector,
+    simd::{Vector, splat3},
     slab::{CONDITION, PreparedRay, UNIT_ROUNDOFF, pow2},
 };
 
@@ -25,8 +27,17 @@ pub(crate) struct RayShear<'a, V> {
     ray: &'a Ray,
     /// Of the shear.
     axes: &'static [usize; 3],
-    /// By the caller's axes.
-    reciprocal: [V; 3],
+    /// Of the direction's component along z.
+    reciprocal: V,
+}
+
+/// What the test needs to know along a ray, or along as many rays as there are lanes.
+#[derive(Clone, Copy)]
+pub struct Along<V> {
+    /// Of the direction's component along the axis of the shear.
+    pub(crate) reciprocal: V,
+    /// Least `t` at which a hit counts.
+    pub(crate) t_min: V,
 }
 
 /// Vertices, one a lane, as the ray sees them: less its origin, along the axes of the shear, and sheared.
@@ -36,6 +47,35 @@ pub struct Sheared<V> {
     pub y: V,
     /// Not scaled: the distance along the axis of the shear.
     pub z: V,
+}
+
+/// x, y and z of the first, second and third corners.
+pub type Corners<V> = [[V; 3]; 3];
+
+/// On which sides of triangles' edges a ray passes.
+#[derive(Clone, Copy)]
+pub struct Edges<V> {
+    wb: V,
+    wc: V,
+    determinant: V,
+    least: V,
+    most: V,
+    /// The triangles that may be hit, a bit each.
+    pub candidates: u32,
+}
+
+impl<V: Copy + Sub<Output = V> + Mul<Output = V>> Sheared<V> {
+    /// Vertices along the axes of the shear, for rays from `origin` with `slope`: how far they go along x and y for one
+    /// unit along z.
+    #[inline(always)]
+    pub(crate) fn new([x, y, z]: [V; 3], origin: [V; 3], slope: [V; 2]) -> Self {
+        let (x, y, z) = (x - origin[0], y - origin[1], z - origin[2]);
+        Self {
+            x: x - slope[0] * z,
+            y: y - slope[1] * z,
+            z,
+        }
+    }
 }
 
 /// What a ray found among `N` triangles.
@@ -51,13 +91,22 @@ pub struct TriangleHits<V> {
 const MIN_DETERMINANT: f32 = pow2(-100);
 const MAX_DETERMINANT: f32 = pow2(126);
 
-impl<'a, V> RayShear<'a, V> {
+impl<'a, V: Copy> RayShear<'a, V> {
     /// `reciprocal` is [`PreparedRay::reciprocals`].
     #[inline(always)]
     pub(crate) fn new(prepared: &PreparedRay<'a>, reciprocal: [V; 3]) -> Self {
+        let z = prepared.axes[2];
+        // SAFETY: the axes are those of a prepared ray, a permutation of 0 to 2.
+        unsafe { core::hint::assert_unchecked(z < 3) };
+        Self::of(prepared.ray, prepared.axes, reciprocal[z])
+    }
+
+    /// Of a prepared ray, its axes and the reciprocal along the last of them.
+    #[inline(always)]
+    pub(crate) fn of(ray: &'a Ray, axes: &'static [usize; 3], reciprocal: V) -> Self {
         Self {
-            ray: prepared.ray,
-            axes: prepared.axes,
+            ray,
+            axes,
             reciprocal,
         }
     }
@@ -78,29 +127,42 @@ impl<'a, V> RayShear<'a, V> {
         // As arrays: glam's index branches.
         let (origin, direction): (&[f32; 3], &[f32; 3]) =
             (self.ray.origin.as_ref(), self.ray.direction.as_ref());
-        let x = V::load(token, &vertices[kx]) - V::splat(token, origin[kx]);
-        let y = V::load(token, &vertices[ky]) - V::splat(token, origin[ky]);
-        let z = V::load(token, &vertices[kz]) - V::splat(token, origin[kz]);
-        let shear_x = V::splat(token, direction[kx]) * self.reciprocal[kz];
-        let shear_y = V::splat(token, direction[ky]) * self.reciprocal[kz];
-        Sheared {
-            x: x - shear_x * z,
-            y: y - shear_y * z,
-            z,
-        }
+        let origin = splat3(token, [origin[kx], origin[ky], origin[kz]]);
+        let slope = [
+            V::splat(token, direction[kx]) * self.reciprocal,
+            V::splat(token, direction[ky]) * self.reciprocal,
+        ];
+        let vertices = [
+            V::load(token, &vertices[kx]),
+            V::load(token, &vertices[ky]),
+            V::load(token, &vertices[kz]),
+        ];
+        Sheared::new(vertices, origin, slope)
     }
 
-    /// The triangles, of those that `lanes` has a bit for, that are hit within the ray's range up to
-    /// `t_max`. `x`, `y` and `z` are those of [`Sheared`] for the three corners. If `NEED_T` is not set, it is
-    /// enough to know whether there are any.
+    /// What the rest of the test needs of the ray.
     #[inline(always)]
-    pub(crate) fn test<const N: usize, const NEED_T: bool>(
+    pub(crate) fn along<const N: usize>(&self, token: V::Token) -> Along<V>
+    where
+        V: Vector<N>,
+    {
+        Along {
+            reciprocal: self.reciprocal,
+            t_min: V::splat(token, self.ray.t_min),
+        }
+    }
+}
+
+impl<V> Along<V> {
+    /// The edge functions of triangles, and which of them, of those that `lanes` has a bit for, may be hit. `x`, `y`
+    /// and `z` are those of [`Sheared`] for the three corners.
+    #[inline(always)]
+    pub(crate) fn edges<const N: usize>(
         &self,
         token: V::Token,
-        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]: [[V; 3]; 3],
+        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]: Corners<V>,
         lanes: u32,
-        t_max: V,
-    ) -> Option<TriangleHits<V>>
+    ) -> Edges<V>
     where
         V: Vector<N>,
     {
@@ -113,17 +175,45 @@ impl<'a, V> RayShear<'a, V> {
         let size = determinant.abs();
         let finite = size.lt(V::splat(token, MAX_DETERMINANT));
         let missed = least.lt(zero) & zero.lt(most) & finite;
-        let kz = self.axes[2];
-        // SAFETY: as above.
-        unsafe { core::hint::assert_unchecked(kz < 3) };
-        let reciprocal = self.reciprocal[kz];
+        let reciprocal = self.reciprocal;
         let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
-        let ahead = V::splat(token, self.ray.t_min).le(last);
-        let candidates = lanes & ahead.bits() & !missed.bits();
-        if candidates == 0 {
-            return None;
+        let ahead = self.t_min.le(last);
+        Edges {
+            wb,
+            wc,
+            determinant,
+            least,
+            most,
+            candidates: lanes & ahead.bits() & !missed.bits(),
         }
+    }
 
+    /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`. If `NEED_T` is not
+    /// set, it is enough to know whether there are any.
+    #[inline(always)]
+    pub(crate) fn test<const N: usize, const NEED_T: bool>(
+        &self,
+        token: V::Token,
+        corners: Corners<V>,
+        edges: Edges<V>,
+        t_max: V,
+    ) -> Option<TriangleHits<V>>
+    where
+        V: Vector<N>,
+    {
+        let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = corners;
+        let Edges {
+            wb,
+            wc,
+            determinant,
+            least,
+            most,
+            candidates,
+        } = edges;
+        let size = determinant.abs();
+        let finite = size.lt(V::splat(token, MAX_DETERMINANT));
+        let zero = V::splat(token, 0.0);
+        let reciprocal = self.reciprocal;
         let (ab, ac) = (bz - az, cz - az);
         let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
         let extent_y = ay.abs().max(by.abs()).max(cy.abs());
@@ -142,10 +232,7 @@ impl<'a, V> RayShear<'a, V> {
             + (az.abs() + depth) * V::splat(token, 64.0 * UNIT_ROUNDOFF))
             * reciprocal.abs();
         let (least_t, most_t) = (t - error, t + error);
-        let (t_min, infinity) = (
-            V::splat(token, self.ray.t_min),
-            V::splat(token, f32::INFINITY),
-        );
+        let (t_min, infinity) = (self.t_min, V::splat(token, f32::INFINITY));
         let outside = sound & (most_t.lt(t_min) | t_max.lt(least_t));
         let candidates = candidates & !outside.bits();
         let mut mask = candidates & certain.bits();

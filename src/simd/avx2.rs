@@ -1,6 +1,6 @@
 //! The backend of x86-64 processors with AVX2, FMA and BMI: Haswell (2013), Zen (2017) and later.
 
-use super::{Simd, Vector};
+use super::{Lanes, Simd, Vector};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -25,6 +25,12 @@ impl Simd for Avx2 {
     fn low(vector: F32x8) -> F32x4 {
         // SAFETY: the vector exists only where an `Avx2` token was given.
         F32x4(unsafe { _mm256_castps256_ps128(vector.0) })
+    }
+
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+        // SAFETY: the token says that the instructions are there.
+        unsafe { transpose(rows) }
     }
 
     #[inline(always)]
@@ -61,7 +67,7 @@ macro_rules! impl_vector {
     (
         $vector:ident, $n:literal, $splat:ident, $load:ident, $store:ident,
         $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident, $or:ident, $andnot:ident,
-        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:expr
+        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident
     ) => {
         impl_operator!($vector, Add, add, $add);
         impl_operator!($vector, Sub, sub, $sub);
@@ -73,22 +79,40 @@ macro_rules! impl_vector {
         // SAFETY of every block below: `Avx2::detect` saw the instructions, and only its token, or a
         // vector made through it, gets here. Loads and stores are of whole arrays, unaligned.
         #[allow(clippy::undocumented_unsafe_blocks)]
-        impl Vector<$n> for $vector {
+        impl Lanes for $vector {
             type Token = Avx2;
+            type Array = [f32; $n];
 
             #[inline(always)]
             fn splat(_: Avx2, x: f32) -> Self {
                 Self(unsafe { $splat(x) })
             }
             #[inline(always)]
-            fn load(_: Avx2, lanes: &[f32; $n]) -> Self {
-                Self(unsafe { $load(lanes.as_ptr()) })
-            }
-            #[inline(always)]
             fn to_array(self) -> [f32; $n] {
                 let mut lanes = [0.0; $n];
                 unsafe { $store(lanes.as_mut_ptr(), self.0) };
                 lanes
+            }
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                unsafe { $movemask(self.0) as u32 }
+            }
+            #[inline(always)]
+            fn least(self, among: Self) -> usize {
+                unsafe { $least(self.0, among.0) }
+            }
+            #[inline(always)]
+            unsafe fn compress(self, mask: u32, to: *mut f32) {
+                let lanes = &COMPRESSED[mask as usize % (1 << $n)];
+                unsafe { $store(to, $permute(self.0, lanes.first_chunk().unwrap_unchecked())) };
+            }
+        }
+
+        #[allow(clippy::undocumented_unsafe_blocks)]
+        impl Vector<$n> for $vector {
+            #[inline(always)]
+            fn load(_: Avx2, lanes: &[f32; $n]) -> Self {
+                Self(unsafe { $load(lanes.as_ptr()) })
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -119,8 +143,8 @@ macro_rules! impl_vector {
                 Self(unsafe { $blend(no.0, yes.0, self.0) })
             }
             #[inline(always)]
-            fn bits(self) -> u32 {
-                unsafe { $movemask(self.0) as u32 }
+            fn of_bits(_: Avx2, bits: u32) -> Self {
+                Self(unsafe { $of_bits(bits) })
             }
             #[inline(always)]
             fn permute(self, lanes: &[u8; $n]) -> Self {
@@ -149,10 +173,9 @@ impl_vector!(
     _mm_cmp_ps,
     _mm_blendv_ps,
     _mm_movemask_ps,
-    |vector, lanes: &[u8; 4]| {
-        let lanes = _mm_cvtsi32_si128(i32::from_le_bytes(*lanes));
-        _mm_permutevar_ps(vector, _mm_cvtepu8_epi32(lanes))
-    }
+    permute4,
+    least4,
+    of_bits4
 );
 
 impl_vector!(
@@ -174,8 +197,155 @@ impl_vector!(
     _mm256_cmp_ps,
     _mm256_blendv_ps,
     _mm256_movemask_ps,
-    |vector, lanes: &[u8; 8]| {
-        let lanes = _mm_cvtsi64_si128(i64::from_le_bytes(*lanes));
-        _mm256_permutevar8x32_ps(vector, _mm256_cvtepu8_epi32(lanes))
-    }
+    permute8,
+    least8,
+    of_bits8
 );
+
+/// For a mask of lanes, their numbers in order.
+static COMPRESSED: [[u8; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 != 0 {
+                table[mask][count] = lane as u8;
+                count += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+// SAFETY of what follows: called with vectors of this module alone, which exist only where an `Avx2` token was given.
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn permute4(vector: __m128, lanes: &[u8; 4]) -> __m128 {
+    let lanes = _mm_cvtsi32_si128(i32::from_le_bytes(*lanes));
+    _mm_permutevar_ps(vector, _mm_cvtepu8_epi32(lanes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn permute8(vector: __m256, lanes: &[u8; 8]) -> __m256 {
+    let lanes = _mm_cvtsi64_si128(i64::from_le_bytes(*lanes));
+    _mm256_permutevar8x32_ps(vector, _mm256_cvtepu8_epi32(lanes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn of_bits4(bits: u32) -> __m128 {
+    let lanes = _mm_setr_epi32(1, 2, 4, 8);
+    let set = _mm_and_si128(_mm_set1_epi32(bits as i32), lanes);
+    _mm_castsi128_ps(_mm_cmpeq_epi32(set, lanes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn of_bits8(bits: u32) -> __m256 {
+    let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    let set = _mm256_and_si256(_mm256_set1_epi32(bits as i32), lanes);
+    _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lanes))
+}
+
+/// Numbers as integers, which are ordered alike if they are not negative, with their lane in the lowest bits.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn least8(numbers: __m256, among: __m256) -> usize {
+    let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    let numbers = _mm256_and_si256(_mm256_castps_si256(numbers), _mm256_set1_epi32(!7));
+    let numbers = _mm256_castsi256_ps(_mm256_or_si256(numbers, lanes));
+    let most = _mm256_castsi256_ps(_mm256_set1_epi32(i32::MAX));
+    let keys = _mm256_castps_si256(_mm256_blendv_ps(most, numbers, among));
+    let halves = _mm_min_epi32(
+        _mm256_castsi256_si128(keys),
+        _mm256_extracti128_si256::<1>(keys),
+    );
+    least_key(halves)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn least4(numbers: __m128, among: __m128) -> usize {
+    let lanes = _mm_setr_epi32(0, 1, 2, 3);
+    let numbers = _mm_and_si128(_mm_castps_si128(numbers), _mm_set1_epi32(!7));
+    let numbers = _mm_castsi128_ps(_mm_or_si128(numbers, lanes));
+    let most = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX - 4));
+    least_key(_mm_castps_si128(_mm_blendv_ps(most, numbers, among)))
+}
+
+/// The three lowest bits of the least.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn least_key(keys: __m128i) -> usize {
+    let pairs = _mm_min_epi32(keys, _mm_shuffle_epi32::<0b01_00_11_10>(keys));
+    let least = _mm_min_epi32(pairs, _mm_shuffle_epi32::<0b10_11_00_01>(pairs));
+    (_mm_cvtsi128_si32(least) & 7) as usize
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn transpose(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+    // SAFETY: whole rows, unaligned.
+    let row = unsafe {
+        [
+            _mm256_loadu_ps(rows[0].as_ptr()),
+            _mm256_loadu_ps(rows[1].as_ptr()),
+            _mm256_loadu_ps(rows[2].as_ptr()),
+            _mm256_loadu_ps(rows[3].as_ptr()),
+            _mm256_loadu_ps(rows[4].as_ptr()),
+            _mm256_loadu_ps(rows[5].as_ptr()),
+            _mm256_loadu_ps(rows[6].as_ptr()),
+            _mm256_loadu_ps(rows[7].as_ptr()),
+        ]
+    };
+    // Pairs of rows, then fours, within each half of a vector; then the halves.
+    let (a, b) = (
+        _mm256_unpacklo_ps(row[0], row[1]),
+        _mm256_unpackhi_ps(row[0], row[1]),
+    );
+    let (c, d) = (
+        _mm256_unpacklo_ps(row[2], row[3]),
+        _mm256_unpackhi_ps(row[2], row[3]),
+    );
+    let (e, f) = (
+        _mm256_unpacklo_ps(row[4], row[5]),
+        _mm256_unpackhi_ps(row[4], row[5]),
+    );
+    let (g, h) = (
+        _mm256_unpacklo_ps(row[6], row[7]),
+        _mm256_unpackhi_ps(row[6], row[7]),
+    );
+    const LOW: i32 = 0b01_00_01_00;
+    const HIGH: i32 = 0b11_10_11_10;
+    let (ac0, ac1) = (
+        _mm256_shuffle_ps::<LOW>(a, c),
+        _mm256_shuffle_ps::<HIGH>(a, c),
+    );
+    let (bd0, bd1) = (
+        _mm256_shuffle_ps::<LOW>(b, d),
+        _mm256_shuffle_ps::<HIGH>(b, d),
+    );
+    let (eg0, eg1) = (
+        _mm256_shuffle_ps::<LOW>(e, g),
+        _mm256_shuffle_ps::<HIGH>(e, g),
+    );
+    let (fh0, fh1) = (
+        _mm256_shuffle_ps::<LOW>(f, h),
+        _mm256_shuffle_ps::<HIGH>(f, h),
+    );
+    [
+        F32x8(_mm256_permute2f128_ps::<0x20>(ac0, eg0)),
+        F32x8(_mm256_permute2f128_ps::<0x20>(ac1, eg1)),
+        F32x8(_mm256_permute2f128_ps::<0x20>(bd0, fh0)),
+        F32x8(_mm256_permute2f128_ps::<0x20>(bd1, fh1)),
+        F32x8(_mm256_permute2f128_ps::<0x31>(ac0, eg0)),
+        F32x8(_mm256_permute2f128_ps::<0x31>(ac1, eg1)),
+        F32x8(_mm256_permute2f128_ps::<0x31>(bd0, fh0)),
+        F32x8(_mm256_permute2f128_ps::<0x31>(bd1, fh1)),
+    ]
+}

@@ -18,4 +18,4 @@ pub(crate) use avx512::Avx512;
 pub use backend::Backend;
 pub(crate) use backend::Operation;
 pub(crate) use portable::Portable;
-pub(crate) use vector::{Simd, Vector, splat3};
+pub(crate) use vector::{Lanes, Simd, Vector, splat3};

@@ -1,6 +1,6 @@
 //! The backend of any machine, over the `wide` crate: SSE2, NEON, simd128 or scalar, as compiled for.
 
-use super::{Simd, Vector};
+use super::{Lanes, Simd, Vector};
 use wide::{f32x4, f32x8};
 
 /// The instructions that the program was compiled for.
@@ -23,20 +23,53 @@ impl Simd for Portable {
 
 macro_rules! impl_vector {
     ($vector:ty, $n:literal) => {
-        impl Vector<$n> for $vector {
+        impl Lanes for $vector {
             type Token = Portable;
+            type Array = [f32; $n];
 
             #[inline(always)]
             fn splat(_: Portable, x: f32) -> Self {
                 <$vector>::splat(x)
             }
             #[inline(always)]
-            fn load(_: Portable, lanes: &[f32; $n]) -> Self {
-                <$vector>::new(*lanes)
-            }
-            #[inline(always)]
             fn to_array(self) -> [f32; $n] {
                 self.to_array()
+            }
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                self.to_bitmask()
+            }
+            #[inline(always)]
+            fn least(self, among: Self) -> usize {
+                let (lanes, mut mask) = (self.to_array(), among.bits());
+                let mut least = mask.trailing_zeros() as usize % $n;
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize % $n;
+                    if lanes[lane] < lanes[least] {
+                        least = lane;
+                    }
+                    mask &= mask - 1;
+                }
+                least
+            }
+            #[inline(always)]
+            unsafe fn compress(self, mut mask: u32, mut to: *mut f32) {
+                let lanes = self.to_array();
+                while mask != 0 {
+                    // SAFETY: no more floats than there are lanes, which the caller has room for.
+                    unsafe {
+                        to.write(lanes[mask.trailing_zeros() as usize % $n]);
+                        to = to.add(1);
+                    }
+                    mask &= mask - 1;
+                }
+            }
+        }
+
+        impl Vector<$n> for $vector {
+            #[inline(always)]
+            fn load(_: Portable, lanes: &[f32; $n]) -> Self {
+                <$vector>::new(*lanes)
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -67,8 +100,12 @@ macro_rules! impl_vector {
                 <$vector>::bitselect(self, yes, no)
             }
             #[inline(always)]
-            fn bits(self) -> u32 {
-                self.to_bitmask()
+            fn of_bits(_: Portable, bits: u32) -> Self {
+                let mut lanes = [0.0; $n];
+                for (lane, set) in lanes.iter_mut().enumerate() {
+                    *set = f32::from_bits(0u32.wrapping_sub(bits >> lane & 1));
+                }
+                <$vector>::new(lanes)
             }
             #[inline(always)]
             fn permute(self, lanes: &[u8; $n]) -> Self {

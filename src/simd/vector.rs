@@ -17,13 +17,62 @@ pub trait Simd: Copy {
     /// The first four of eight.
     fn low(vector: Self::F32x8) -> Self::F32x4;
 
+    /// Eight rows of eight as columns.
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 8]; 8]) -> [Self::F32x8; 8] {
+        let mut columns = [[0.0; 8]; 8];
+        for (lane, row) in rows.iter().enumerate() {
+            for (column, &number) in columns.iter_mut().zip(row) {
+                column[lane] = number;
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = &columns;
+        [
+            Self::F32x8::load(self, a),
+            Self::F32x8::load(self, b),
+            Self::F32x8::load(self, c),
+            Self::F32x8::load(self, d),
+            Self::F32x8::load(self, e),
+            Self::F32x8::load(self, f),
+            Self::F32x8::load(self, g),
+            Self::F32x8::load(self, h),
+        ]
+    }
+
     /// Has the three cache lines from `address` on fetched, if the backend can. Any address will do.
     fn prefetch(self, address: *const u8);
 }
 
-/// `N` floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.
+/// Some floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.
+pub trait Lanes: Copy {
+    /// The backend it belongs to.
+    type Token: Simd;
+    /// As many floats.
+    type Array: AsRef<[f32]>;
+
+    /// `x` in every lane.
+    fn splat(token: Self::Token, x: f32) -> Self;
+    /// The lanes as an array.
+    fn to_array(self) -> Self::Array;
+    /// Bit `i` is the sign of lane `i`, so that a comparison's outcome has a bit for each lane that is set. The bits
+    /// above are zero.
+    fn bits(self) -> u32;
+
+    /// The lane of the least number, or nearly, of those that `among`, a comparison's outcome, is set for; negative
+    /// numbers are in no order. Any lane if it is set for none.
+    fn least(self, among: Self) -> usize;
+
+    /// Writes the lanes that `mask` has a bit for to `to` on, in their order. What follows them, up to as many
+    /// floats as there are lanes, is overwritten with anything.
+    ///
+    /// # Safety
+    /// There is room for as many floats as there are lanes.
+    unsafe fn compress(self, mask: u32, to: *mut f32);
+}
+
+/// `N` floats.
 pub trait Vector<const N: usize>:
-    Copy
+    Lanes<Array = [f32; N]>
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -31,15 +80,8 @@ pub trait Vector<const N: usize>:
     + BitAnd<Output = Self>
     + BitOr<Output = Self>
 {
-    /// The backend it belongs to.
-    type Token: Simd;
-
-    /// `x` in every lane.
-    fn splat(token: Self::Token, x: f32) -> Self;
     /// One lane from each element.
     fn load(token: Self::Token, lanes: &[f32; N]) -> Self;
-    /// The lanes as an array.
-    fn to_array(self) -> [f32; N];
 
     /// `self * factor + addend`, rounded once or twice.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
@@ -56,9 +98,6 @@ pub trait Vector<const N: usize>:
     fn le(self, other: Self) -> Self;
     /// `self` is a comparison's outcome: `yes` where it is set, else `no`.
     fn select(self, yes: Self, no: Self) -> Self;
-    /// `self` is a comparison's outcome: bit `i` is lane `i`, the bits above are zero.
-    fn bits(self) -> u32;
-
     /// The same but for lane `lane` modulo `N`, which becomes `x`.
     #[inline(always)]
     fn replace(self, token: Self::Token, lane: usize, x: f32) -> Self {
@@ -72,6 +111,9 @@ pub trait Vector<const N: usize>:
         let mask: &[f32; N] = ONE_LANE[start..start + N].try_into().unwrap_or(&[0.0; N]);
         Self::load(token, mask).select(Self::splat(token, x), self)
     }
+
+    /// A comparison's outcome that is set in the lanes that `bits` has a bit for.
+    fn of_bits(token: Self::Token, bits: u32) -> Self;
 
     /// Lane `i` becomes lane `lanes[i]` modulo `N`.
     fn permute(self, lanes: &[u8; N]) -> Self;

@@ -65,14 +65,21 @@
 //! and Ize, "Robust BVH Ray Traversal" (2013), which widens far by two ULPs; they cover the rounding
 //! of the box test, not that of the triangle test.
 
+mod bundle;
+mod narrow;
 mod prepared;
 
-pub(crate) use prepared::{PreparedRay, pow2, reciprocal};
+pub use bundle::BundleSlabs;
+pub(crate) use bundle::{Bundling, most};
+pub use narrow::NarrowSlabs;
+pub(crate) use narrow::SceneExtent;
+pub(crate) use prepared::{PreparedRay, pow2, reciprocal, unscaled};
 
 use crate::{
     geometry::{Aabb, Ray},
     simd::{Vector, splat3},
 };
+use glam::Vec3;
 
 /// Half the distance from 1 to the next float: the relative error of one rounding.
 pub(crate) const UNIT_ROUNDOFF: f32 = pow2(-24);
@@ -87,7 +94,7 @@ pub(crate) const CONDITION: f32 = 2.0;
 /// No distance is taken to be smaller when errors are estimated: (6) above.
 const MIN_EXTENT: f32 = pow2(-70);
 /// Up to here nothing overflows: (6) above.
-const MAX_EXTENT: f32 = pow2(77);
+pub(crate) const MAX_EXTENT: f32 = pow2(77);
 
 /// What the box test needs of a ray and a scene, in every lane: 9 vectors, kept in registers.
 #[derive(Clone, Copy)]
@@ -98,8 +105,22 @@ pub struct RaySlabs<const N: usize, V> {
     /// The least `t`, less [`margin`](Self::margin).
     t_min: V,
     margin: V,
-    /// 1 where the direction is negative: which of a box's two planes is met first.
-    negative: [usize; 3],
+    /// How many bytes after the first of a node's planes those are that are met first, by axis.
+    first: [usize; 3],
+}
+
+/// What is added to a plane times the reciprocal, for the plane that is met first and for the other. `error` is the
+/// margin less the reciprocal's magnitude.
+#[inline(always)]
+fn plane_terms<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    origin: V,
+    reciprocal: V,
+    error: V,
+) -> (V, V) {
+    let at_origin = V::splat(token, 0.0) - origin * reciprocal;
+    let error = error * reciprocal.abs();
+    (at_origin - error, at_origin + error)
 }
 
 /// The planes of `N` boxes: by axis, then `min` and `max`, then box.
@@ -109,7 +130,27 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
     /// For boxes within `bounds`. `reciprocal` is [`PreparedRay::reciprocals`], narrowed.
     #[inline(always)]
     pub(crate) fn new(token: V::Token, ray: &Ray, reciprocal: [V; 3], bounds: &Aabb) -> Self {
-        let origin: [V; 3] = splat3(token, ray.origin.to_array());
+        let origin = splat3(token, ray.origin.to_array());
+        let t_min = V::splat(token, ray.t_min);
+        let (mut slabs, extent) =
+            Self::of_lanes(token, origin, reciprocal, t_min, ray.direction, bounds);
+        if extent.lt(V::splat(token, MAX_EXTENT)).bits() == 0 {
+            slabs.open(token);
+        }
+        slabs
+    }
+
+    /// A ray a lane, all of whose directions have the signs of `direction`; and each one's D, which must be less than
+    /// [`MAX_EXTENT`].
+    #[inline(always)]
+    pub(crate) fn of_lanes(
+        token: V::Token,
+        origin: [V; 3],
+        reciprocal: [V; 3],
+        t_min: V,
+        direction: Vec3,
+        bounds: &Aabb,
+    ) -> (Self, V) {
         let (lo, hi): ([V; 3], [V; 3]) = (
             splat3(token, bounds.min.to_array()),
             splat3(token, bounds.max.to_array()),
@@ -130,24 +171,19 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
             reciprocal,
             near: [zero; 3],
             far: [zero; 3],
-            t_min: V::splat(token, ray.t_min) - margin,
+            t_min: t_min - margin,
             margin,
-            negative: [
-                (ray.direction.x.to_bits() >> 31) as usize,
-                (ray.direction.y.to_bits() >> 31) as usize,
-                (ray.direction.z.to_bits() >> 31) as usize,
+            first: [
+                first_planes(0, direction.x, Self::SIDE),
+                first_planes(1, direction.y, Self::SIDE),
+                first_planes(2, direction.z, Self::SIDE),
             ],
         };
         for axis in 0..3 {
-            let at_origin = zero - origin[axis] * reciprocal[axis];
-            let error = error * reciprocal[axis].abs();
-            slabs.near[axis] = at_origin - error;
-            slabs.far[axis] = at_origin + error;
+            let terms = plane_terms(token, origin[axis], reciprocal[axis], error);
+            (slabs.near[axis], slabs.far[axis]) = terms;
         }
-        if extent.lt(V::splat(token, MAX_EXTENT)).bits() == 0 {
-            slabs.open(token);
-        }
-        slabs
+        (slabs, extent)
     }
 
     /// How far the computed `t` of a triangle may be off: what the greatest `t` has to be raised by.
@@ -156,39 +192,98 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         self.margin.to_array()[0]
     }
 
+    /// The same of each lane.
+    #[inline(always)]
+    pub(crate) fn margins(&self) -> V {
+        self.margin
+    }
+
+    /// The reciprocals it was made with.
+    #[inline(always)]
+    pub(crate) fn reciprocals(&self) -> [V; 3] {
+        self.reciprocal
+    }
+
+    /// The least `t`, less the margin.
+    #[inline(always)]
+    pub(crate) fn t_min(&self) -> V {
+        self.t_min
+    }
+
     /// Has every box passed but the empty one.
     #[cold]
     #[inline(never)]
     fn open(&mut self, token: V::Token) {
         for axis in 0..3 {
-            let sign = [1.0, -1.0][self.negative[axis]];
-            self.reciprocal[axis] = V::splat(token, sign * pow2(-126));
+            let tiny = V::splat(token, pow2(-126));
+            let negative = self.reciprocal[axis].lt(V::splat(token, 0.0));
+            self.reciprocal[axis] = negative.select(V::splat(token, -pow2(-126)), tiny);
             self.near[axis] = V::splat(token, -f32::MAX);
             self.far[axis] = V::splat(token, f32::MAX);
         }
     }
 
-    /// Which of the boxes the ray may meet up to `t_max`, raised by the margin: a bit each, and from which
-    /// `t` on.
+    /// Which of the boxes the ray may meet up to `t_max`, raised by the margin, and from which `t` on.
     #[inline(always)]
-    pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (u32, V) {
-        let (near_x, far_x) = self.axis(token, planes, 0);
-        let (near_y, far_y) = self.axis(token, planes, 1);
-        let (near_z, far_z) = self.axis(token, planes, 2);
-        let near = near_x.max(near_y).max(near_z.max(self.t_min));
-        let far = far_x.min(far_y).min(far_z.min(t_max));
-        (near.le(far).bits(), near)
+    pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (V, V) {
+        // SAFETY: `first` is from `first_planes`: either side of an axis.
+        let [near, far] = unsafe { load_planes(token, planes, self.first) };
+        self.between(near, far, t_max)
     }
 
-    /// From where to where the ray is between the two planes of an axis.
+    /// The same, of the planes that are met first and those that are met last.
     #[inline(always)]
-    fn axis(&self, token: V::Token, planes: &Planes<N>, axis: usize) -> (V, V) {
-        let first = self.negative[axis] & 1;
-        let r = self.reciprocal[axis];
-        let near = V::load(token, &planes[axis][first]).mul_add(r, self.near[axis]);
-        let far = V::load(token, &planes[axis][first ^ 1]).mul_add(r, self.far[axis]);
-        (near, far)
+    pub(crate) fn between(&self, near: [V; 3], far: [V; 3], t_max: V) -> (V, V) {
+        let [rx, ry, rz] = self.reciprocal;
+        let near_x = near[0].mul_add(rx, self.near[0]);
+        let near_y = near[1].mul_add(ry, self.near[1]);
+        let near_z = near[2].mul_add(rz, self.near[2]);
+        let far_x = far[0].mul_add(rx, self.far[0]);
+        let far_y = far[1].mul_add(ry, self.far[1]);
+        let far_z = far[2].mul_add(rz, self.far[2]);
+        let near = near_x.max(near_y).max(near_z.max(self.t_min));
+        let far = far_x.min(far_y).min(far_z.min(t_max));
+        (near.le(far), near)
     }
+
+    /// Bytes of one side's planes.
+    const SIDE: usize = size_of::<[f32; N]>();
+}
+
+/// The planes that are met first, and those that are met last.
+///
+/// # Safety
+/// `first` are from [`first_planes`], for as many planes a side.
+#[inline(always)]
+unsafe fn load_planes<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    planes: &Planes<N>,
+    first: [usize; 3],
+) -> [[V; 3]; 2] {
+    let side = size_of::<[f32; N]>();
+    let planes: *const [f32; N] = planes.as_ptr().cast();
+    // SAFETY: the caller's promise: either side of each axis.
+    unsafe {
+        [
+            [
+                V::load(token, &*planes.byte_add(first[0])),
+                V::load(token, &*planes.byte_add(first[1])),
+                V::load(token, &*planes.byte_add(first[2])),
+            ],
+            [
+                V::load(token, &*planes.byte_add(first[0] ^ side)),
+                V::load(token, &*planes.byte_add(first[1] ^ side)),
+                V::load(token, &*planes.byte_add(first[2] ^ side)),
+            ],
+        ]
+    }
+}
+
+/// How many bytes after the first of a node's planes those are, `side` bytes a side, that a ray of this direction meets
+/// first.
+#[inline(always)]
+fn first_planes(axis: usize, direction: f32, side: usize) -> usize {
+    (2 * axis + (direction.to_bits() >> 31) as usize) * side
 }
 
 /// The interval of `t` within which a primitive's own bounds are met, for the hit to be put into: (5) above.

@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Portable, Simd, Vector, splat3},
+    simd::{Lanes, Portable, Vector, splat3},
 };
 
 /// A ray that can hit something, in numbers that the kernels can work with.
@@ -23,6 +23,11 @@ pub struct PreparedRay<'a> {
     /// Its inverse.
     unscale: f32,
 }
+
+/// The largest component of a direction is left as it is from here...
+const LEAST_DIRECTION: f32 = pow2(-23);
+/// ... to below here.
+const LONG_DIRECTION: f32 = pow2(24);
 
 /// Above this a reciprocal is cut off, so that a direction component that is zero, or next to it, needs no
 /// branch and makes no 0 · ∞. What it must satisfy is said in [`slab`](super).
@@ -60,7 +65,7 @@ impl<'a> PreparedRay<'a> {
         // Not by glam's index, which branches.
         let negative = ray.direction.as_ref()[z].is_sign_negative();
         let axes = &SHEAR_AXES[2 * z + usize::from(negative)];
-        if (pow2(-23)..pow2(24)).contains(&largest) {
+        if (LEAST_DIRECTION..LONG_DIRECTION).contains(&largest) {
             return Some(Self {
                 ray,
                 axes,
@@ -77,6 +82,41 @@ impl<'a> PreparedRay<'a> {
         })
     }
 
+    /// Whether the rays, a number of theirs a vector, are all as the caller gave them once they are prepared, of
+    /// directions with signs as this ray's and with these axes.
+    #[inline(always)]
+    pub(crate) fn is_like<const N: usize, V: Vector<N>>(
+        &self,
+        token: V::Token,
+        origin: [V; 3],
+        direction: [V; 3],
+        [t_min, t_max]: [V; 2],
+    ) -> bool {
+        let all = u32::MAX >> (32 - N);
+        let zero = V::splat(token, 0.0);
+        let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
+        let largest = x.max(y).max(z);
+        let along = [x.lt(largest), x.lt(largest) & y.lt(largest)];
+        let axis = match self.axes[2] {
+            0 => largest.le(x),
+            1 => largest.le(y) & along[0],
+            _ => largest.le(z) & along[1],
+        };
+        let zeros = origin[0] * zero + origin[1] * zero + origin[2] * zero;
+        let ordinary = axis
+            & V::splat(token, LEAST_DIRECTION).le(largest)
+            & largest.lt(V::splat(token, LONG_DIRECTION))
+            & zeros.le(zero)
+            & t_min.le(t_max)
+            & t_min.lt(V::splat(token, f32::INFINITY));
+        let mut alike = self.unscale == 1.0 && ordinary.bits() == all;
+        for (axis, number) in direction.into_iter().enumerate() {
+            let negative = self.ray.direction.as_ref()[axis].is_sign_negative();
+            alike &= number.bits() == if negative { all } else { 0 };
+        }
+        alike
+    }
+
     /// Room for [`PreparedRay::new`].
     pub(crate) const ROOM: Ray = Ray {
         origin: glam::Vec3::ZERO,
@@ -87,13 +127,25 @@ impl<'a> PreparedRay<'a> {
 
     /// The reciprocals of the direction, by axis.
     #[inline(always)]
-    pub(crate) fn reciprocals<T: Simd>(&self, token: T) -> [T::F32x8; 3] {
-        let [x, y, z]: [T::F32x8; 3] = splat3(token, self.ray.direction.to_array());
+    pub(crate) fn reciprocals<const N: usize, V: Vector<N>>(&self, token: V::Token) -> [V; 3] {
+        let [x, y, z]: [V; 3] = splat3(token, self.ray.direction.to_array());
         [
             reciprocal(token, x),
             reciprocal(token, y),
             reciprocal(token, z),
         ]
+    }
+
+    /// The reciprocals of the direction, an axis a lane. The fourth lane is of no meaning.
+    #[inline(always)]
+    pub(crate) fn reciprocal<V: Vector<4>>(&self, token: V::Token) -> V {
+        reciprocal(token, V::load(token, self.ray.direction_and_more()))
+    }
+
+    /// What an accepted `t` is to be multiplied by for [`unscaled`](Self::unscaled).
+    #[inline(always)]
+    pub(crate) fn unscale(&self) -> f32 {
+        self.unscale
     }
 
     /// The caller's `t` as a scaled one.
@@ -106,10 +158,16 @@ impl<'a> PreparedRay<'a> {
     /// scale take it out of what a float can hold.
     #[inline(always)]
     pub(crate) fn unscaled(&self, t: f32, ray: &Ray) -> f32 {
-        let t = lesser(t * self.unscale, f32::MAX);
-        // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
-        lesser(greater(t, ray.t_min), ray.t_max) + 0.0
+        unscaled(t, self.unscale, ray)
     }
+}
+
+/// See [`PreparedRay::unscaled`].
+#[inline(always)]
+pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
+    let t = lesser(t * unscale, f32::MAX);
+    // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
+    lesser(greater(t, ray.t_min), ray.t_max) + 0.0
 }
 
 /// Whether origin and direction are.
@@ -119,7 +177,7 @@ fn is_finite(ray: &Ray) -> bool {
     let lanes: &[f32; 8] = bytemuck::cast_ref(ray);
     let zero = wide::f32x8::splat(0.0);
     let zeros = wide::f32x8::load(Portable, lanes) * zero;
-    Vector::<8>::bits(Vector::<8>::le(zeros, zero)) & 0b11_1111 == 0b11_1111
+    Vector::<8>::le(zeros, zero).bits() & 0b11_1111 == 0b11_1111
 }
 
 /// Writes `ray` with its direction scaled so that the largest component is in [1, 2), or as near as powers
@@ -159,7 +217,7 @@ pub(crate) fn greater(a: f32, b: f32) -> f32 {
 
 /// The lesser of two numbers, neither of them NaN.
 #[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
+pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 

@@ -3,7 +3,7 @@
 use crate::{
     geometry::Ray,
     layout::{Bvh, Child, Leaf, Link, STACK, Storage, WideNode},
-    simd::Simd,
+    simd::{Lanes, Simd},
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
 
@@ -73,7 +73,8 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
             let node = unsafe { &*nodes.byte_add(current.node_offset()) };
-            let (mut mask, near) = node.test(token, &slabs, N::splat(token, t_max));
+            let (hit, near) = node.test(token, &slabs, N::Lanes::<T>::splat(token, t_max));
+            let mut mask = hit.bits();
             if mask == 0 {
                 match pop(&stack, &mut len, t_max) {
                     Some(link) => current = link,
@@ -88,7 +89,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
             if mask == 0 {
                 continue;
             }
-            let near = N::lanes(&near);
+            let near = near.to_array();
             // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
             let entry = |lane: usize| unsafe {
                 let link = *node.links().get_unchecked(lane);

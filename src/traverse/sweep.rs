@@ -6,7 +6,7 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::{TriangleLeaf, WideNode},
     primitive::triangle::RayShear,
-    simd::{Backend, Operation, Simd},
+    simd::{Backend, Lanes, Operation, Simd},
     slab::PreparedRay,
 };
 
@@ -23,8 +23,8 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
             };
             let reciprocal = prepared.reciprocals(token);
             let slabs = N::slabs(token, prepared.ray, reciprocal, self.1);
-            let t_max = N::splat(token, prepared.ray.t_max + N::margin(&slabs));
-            let passed = |node: &N| node.test(token, &slabs, t_max).0.count_ones();
+            let t_max = N::Lanes::<T>::splat(token, prepared.ray.t_max + N::margin(&slabs));
+            let passed = |node: &N| node.test(token, &slabs, t_max).0.bits().count_ones();
             self.0.iter().map(passed).sum()
         }
     }

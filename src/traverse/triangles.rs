@@ -8,9 +8,9 @@ use super::{
 use crate::{
     geometry::{Hit, Ray},
     layout::{Bvh, Storage, TriangleLeaf, WideNode},
-    primitive::triangle::{RayShear, bits},
-    simd::{Operation, Simd, Vector},
-    slab::PreparedRay,
+    primitive::triangle::{RayShear, TriangleHits, bits},
+    simd::{Lanes, Operation, Simd},
+    slab::{PreparedRay, unscaled},
 };
 use core::ops::ControlFlow;
 
@@ -36,13 +36,74 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
 }
 
 /// The best hit so far.
-#[derive(Clone, Copy)]
-struct Found {
-    t: f32,
-    u: f32,
-    v: f32,
+#[derive(Clone, Copy, Default)]
+pub(super) struct Found {
+    pub(super) t: f32,
+    pub(super) u: f32,
+    pub(super) v: f32,
     /// Its place in the list of primitive numbers, which is read when it is needed.
-    place: usize,
+    pub(super) place: usize,
+}
+
+impl Found {
+    /// Takes note of the triangles of `leaf` that are hit up to `t_max`, which becomes the best one's.
+    #[inline(always)]
+    pub(super) fn update<T: Simd>(
+        token: T,
+        best: &mut Option<Self>,
+        t_max: &mut f32,
+        leaf: &TriangleLeaf,
+        shear: &RayShear<'_, T::F32x8>,
+        primitives: &[u32],
+    ) {
+        let Some(hits) = leaf.test::<T, true>(token, shear, *t_max) else {
+            return;
+        };
+        Self::choose::<T>(best, t_max, leaf, hits, primitives);
+    }
+
+    /// Takes note of hits in `leaf`, none farther than `t_max`, which becomes the best one's. Whether there is a new
+    /// best one.
+    #[inline(always)]
+    pub(super) fn choose<T: Simd>(
+        best: &mut Option<Self>,
+        t_max: &mut f32,
+        leaf: &TriangleLeaf,
+        hits: TriangleHits<T::F32x8>,
+        primitives: &[u32],
+    ) -> bool {
+        let mut any_closer = false;
+        let (t, u, v) = (hits.t.to_array(), hits.u.to_array(), hits.v.to_array());
+        for lane in bits(hits.mask) {
+            let found = Self {
+                t: t[lane],
+                u: u[lane],
+                v: v[lane],
+                place: leaf.first() + lane,
+            };
+            let closer = best.is_none_or(|best| {
+                found.t < best.t
+                    || found.t == best.t && primitives[found.place] < primitives[best.place]
+            });
+            if closer {
+                *t_max = found.t;
+                *best = Some(found);
+                any_closer = true;
+            }
+        }
+        any_closer
+    }
+
+    /// In the caller's terms.
+    #[inline(always)]
+    pub(super) fn hit(self, ray: &Ray, unscale: f32, primitives: &[u32]) -> Hit {
+        Hit {
+            t: unscaled(self.t, unscale, ray),
+            u: self.u,
+            v: self.v,
+            primitive: primitives[self.place],
+        }
+    }
 }
 
 struct Closest<'a, N: WideNode, S: Storage> {
@@ -143,12 +204,8 @@ impl<'a, T: Simd> ClosestVisitor<'a, T> {
     /// What was found, in the caller's terms.
     #[inline(always)]
     fn hit(&self, ray: &Ray, prepared: &PreparedRay) -> Option<Hit> {
-        self.found.map(|Found { t, u, v, place }| Hit {
-            t: prepared.unscaled(t, ray),
-            u,
-            v,
-            primitive: self.primitives[place],
-        })
+        let found = self.found?;
+        Some(found.hit(ray, prepared.unscale(), self.primitives))
     }
 }
 
@@ -157,26 +214,14 @@ impl<T: Simd> Visitor<TriangleLeaf> for ClosestVisitor<'_, T> {
 
     #[inline(always)]
     fn leaf(&mut self, leaf: &TriangleLeaf) -> ControlFlow<(), f32> {
-        if let Some(hits) = leaf.test::<T, true>(self.token, &self.shear, self.t_max) {
-            let (t, u, v) = (hits.t.to_array(), hits.u.to_array(), hits.v.to_array());
-            for lane in bits(hits.mask) {
-                let found = Found {
-                    t: t[lane],
-                    u: u[lane],
-                    v: v[lane],
-                    place: leaf.first() + lane,
-                };
-                let closer = self.found.is_none_or(|best| {
-                    found.t < best.t
-                        || found.t == best.t
-                            && self.primitives[found.place] < self.primitives[best.place]
-                });
-                if closer {
-                    self.t_max = found.t;
-                    self.found = Some(found);
-                }
-            }
-        }
+        let Self {
+            token,
+            shear,
+            primitives,
+            t_max,
+            found,
+        } = self;
+        Found::update(*token, found, t_max, leaf, shear, primitives);
         ControlFlow::Continue(self.t_max)
     }
 }

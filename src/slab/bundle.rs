@@ -1,0 +1,166 @@
+//! Many rays of about one origin and one direction against boxes, all at once.
+//!
+//! The planes that a ray meets first are at p·r - o·r. With a point c near all origins that is (p - c)·r - (o - c)·r: the
+//! first term is least at an end of the range that r has over the rays, the second is nearly the same for all. The sum of
+//! the least of each is where the first of the rays may meet the plane, rounding seen to as in the [parent](super):
+//! from (2) there, 7u·D·|r| and 1u·D·|r| for the reciprocal; 2u·D·|r| for p - c and its product; 4u·D·|r| for o - c, at most
+//! 2·D, and its product; 2u·D·|r| and u·E each for the sum with E and the last one: 18u·D·|r| + 3u·E, D being that of all the
+//! rays together. **K_BUNDLE = 24.** That the least product is at an end holds after rounding, for rounding is monotone.
+//!
+//! Interval arithmetic over a bundle: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005); Wald et al.,
+//! "Ray tracing deformable scenes using dynamic bounding volume hierarchies" (2007).
+
+use super::{Planes, UNIT_ROUNDOFF, first_planes, load_planes};
+use crate::simd::{Lanes, Vector, splat3};
+use glam::Vec3;
+
+/// Margin of the test of a bundle: derived above.
+const K_BUNDLE: f32 = 24.0;
+
+/// What the box test needs of a bundle of rays whose directions have the same signs.
+#[derive(Clone, Copy)]
+pub struct BundleSlabs {
+    center: [f32; 3],
+    /// The least and the greatest reciprocals.
+    reciprocal: [[f32; 3]; 2],
+    /// What is added for the planes met first, and for those met last.
+    offset: [[f32; 3]; 2],
+    /// The least of the rays' own, less the margin.
+    t_min: f32,
+    direction: Vec3,
+}
+
+/// [`BundleSlabs`] in the making: of the first ray in a lane, the second in the next, and so on.
+#[derive(Clone, Copy)]
+pub(crate) struct Bundling<V> {
+    center: [V; 3],
+    error: V,
+    reciprocal: [[V; 3]; 2],
+    offset: [[V; 3]; 2],
+    t_min: V,
+}
+
+impl<V: Lanes> Bundling<V> {
+    /// Of no rays so far. `center` is one of their origins, `extent` no less than the D of any.
+    #[inline(always)]
+    pub(crate) fn new<const N: usize>(token: V::Token, center: Vec3, extent: f32) -> Self
+    where
+        V: Vector<N>,
+    {
+        let (least, most) = (
+            V::splat(token, f32::NEG_INFINITY),
+            V::splat(token, f32::INFINITY),
+        );
+        Self {
+            center: splat3(token, center.to_array()),
+            error: V::splat(token, K_BUNDLE * UNIT_ROUNDOFF * extent),
+            reciprocal: [[most; 3], [least; 3]],
+            offset: [[most; 3], [least; 3]],
+            t_min: most,
+        }
+    }
+
+    /// Adds a ray a lane. `t_min` is less the margin.
+    #[inline(always)]
+    pub(crate) fn add<const N: usize>(
+        &mut self,
+        token: V::Token,
+        origin: [V; 3],
+        reciprocal: [V; 3],
+        t_min: V,
+    ) where
+        V: Vector<N>,
+    {
+        let zero = V::splat(token, 0.0);
+        for axis in 0..3 {
+            let r = reciprocal[axis];
+            let at_center = zero - (origin[axis] - self.center[axis]) * r;
+            let error = self.error * r.abs();
+            let [least, most] = &mut self.reciprocal;
+            least[axis] = least[axis].min(r);
+            most[axis] = most[axis].max(r);
+            let [least, most] = &mut self.offset;
+            least[axis] = least[axis].min(at_center - error);
+            most[axis] = most[axis].max(at_center + error);
+        }
+        self.t_min = self.t_min.min(t_min);
+    }
+
+    /// All that were added. `direction` is that of any.
+    #[inline(always)]
+    pub(crate) fn finish<const N: usize>(self, direction: Vec3) -> BundleSlabs
+    where
+        V: Vector<N>,
+    {
+        let [x, y, z] = self.center;
+        BundleSlabs {
+            center: [x.to_array()[0], y.to_array()[0], z.to_array()[0]],
+            reciprocal: [least3(self.reciprocal[0]), most3(self.reciprocal[1])],
+            offset: [least3(self.offset[0]), most3(self.offset[1])],
+            t_min: least(self.t_min),
+            direction,
+        }
+    }
+}
+
+impl BundleSlabs {
+    /// Which of the boxes any of the rays may meet up to `t_max`, raised by their margins, and from which `t` on.
+    #[inline(always)]
+    pub(crate) fn test<const N: usize, V: Vector<N>>(
+        &self,
+        token: V::Token,
+        planes: &Planes<N>,
+        t_max: V,
+    ) -> (V, V) {
+        let side = size_of::<[f32; N]>();
+        let first = [
+            first_planes(0, self.direction.x, side),
+            first_planes(1, self.direction.y, side),
+            first_planes(2, self.direction.z, side),
+        ];
+        // SAFETY: `first` is from `first_planes`.
+        let [near, far]: [[V; 3]; 2] = unsafe { load_planes(token, planes, first) };
+        let (mut enter, mut leave) = (V::splat(token, self.t_min), t_max);
+        for axis in 0..3 {
+            let center = V::splat(token, self.center[axis]);
+            let least = V::splat(token, self.reciprocal[0][axis]);
+            let most = V::splat(token, self.reciprocal[1][axis]);
+            let (near, far) = (near[axis] - center, far[axis] - center);
+            let near = (near * least).min(near * most) + V::splat(token, self.offset[0][axis]);
+            let far = (far * least).max(far * most) + V::splat(token, self.offset[1][axis]);
+            enter = near.max(enter);
+            leave = far.min(leave);
+        }
+        (enter.le(leave), enter)
+    }
+}
+
+#[inline(always)]
+fn least3<const N: usize, V: Vector<N>>([x, y, z]: [V; 3]) -> [f32; 3] {
+    [least(x), least(y), least(z)]
+}
+
+#[inline(always)]
+fn most3<const N: usize, V: Vector<N>>([x, y, z]: [V; 3]) -> [f32; 3] {
+    [most(x), most(y), most(z)]
+}
+
+/// The least lane.
+#[inline(always)]
+pub(crate) fn least<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
+    let mut least = f32::INFINITY;
+    for number in numbers.to_array() {
+        least = if number < least { number } else { least };
+    }
+    least
+}
+
+/// The greatest lane.
+#[inline(always)]
+pub(crate) fn most<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
+    let mut most = f32::NEG_INFINITY;
+    for number in numbers.to_array() {
+        most = if number > most { number } else { most };
+    }
+    most
+}

@@ -1,0 +1,259 @@
+//! Many rays a call.
+
+use super::{
+    bundle,
+    query::{AnyHit, ClosestHit, Query},
+    wave::{self, Lane},
+};
+use crate::{
+    geometry::{Hit, Ray},
+    layout::{Bvh, Storage, TriangleLeaf, WideNode},
+    simd::{Operation, Simd},
+};
+use core::{fmt, mem::MaybeUninit};
+
+/// Rays under way at a time where the memory is ours to choose.
+const LANES: usize = 32;
+
+/// What `LANES` rays under way at a time are kept in, for batches on small stacks; 1 to 64 of them, some 2.3 KiB each.
+///
+/// It need not be cleared between batches, and fits any hierarchy of triangles.
+pub struct Scratch<const LANES: usize>([MaybeUninit<Lane>; LANES]);
+
+impl<const LANES: usize> Scratch<LANES> {
+    /// Fresh memory: nothing is written.
+    #[inline]
+    pub const fn new() -> Self {
+        Self([const { MaybeUninit::uninit() }; LANES])
+    }
+}
+
+impl<const LANES: usize> Default for Scratch<LANES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scratch").field("lanes", &LANES).finish()
+    }
+}
+
+/// Batches. The answers are those of one ray a call, bit for bit, in the order of the rays, whatever that order is; where
+/// `rays` and answers are not as many, the rest of the longer one is left alone.
+///
+/// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
+/// the tree side by side; others are interleaved. Nobody need say which are which.
+impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
+    /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack.
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.backend().run(Batch::<N, S, ClosestHit> {
+            bvh: self,
+            rays,
+            answers: hits,
+        });
+    }
+
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack.
+    pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
+        self.backend().run(Batch::<N, S, AnyHit> {
+            bvh: self,
+            rays,
+            answers: occluded,
+        });
+    }
+
+    /// As [`closest_hits`](Self::closest_hits), in the caller's memory and with hardly more stack than one ray
+    /// takes. All rays are interleaved, `LANES` at a time.
+    pub fn closest_hits_in<const LANES: usize>(
+        &self,
+        scratch: &mut Scratch<LANES>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) {
+        self.backend().run(Wave::<N, S, ClosestHit, LANES> {
+            bvh: self,
+            rays,
+            answers: hits,
+            scratch,
+        });
+    }
+
+    /// As [`any_hits`](Self::any_hits), in the caller's memory. See [`closest_hits_in`](Self::closest_hits_in).
+    pub fn any_hits_in<const LANES: usize>(
+        &self,
+        scratch: &mut Scratch<LANES>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    ) {
+        self.backend().run(Wave::<N, S, AnyHit, LANES> {
+            bvh: self,
+            rays,
+            answers: occluded,
+            scratch,
+        });
+    }
+}
+
+/// Packets: as many rays side by side as an array holds, up to 64; 4 and 8 fill vectors.
+impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
+    /// The [closest hit](Self::closest_hit) of each ray that `active` has a bit for, of the first for the lowest; `None` for
+    /// the others.
+    pub fn closest_hit_packet<const RAYS: usize>(
+        &self,
+        rays: &[Ray; RAYS],
+        active: u64,
+    ) -> [Option<Hit>; RAYS] {
+        self.backend().run(Packet::<N, S, ClosestHit, RAYS> {
+            bvh: self,
+            rays,
+            active,
+            one: Self::closest_hit,
+        })
+    }
+
+    /// Whether [anything is in the way](Self::any_hit) of each ray that `active` has a bit for; `false` for the others.
+    pub fn any_hit_packet<const RAYS: usize>(
+        &self,
+        rays: &[Ray; RAYS],
+        active: u64,
+    ) -> [bool; RAYS] {
+        self.backend().run(Packet::<N, S, AnyHit, RAYS> {
+            bvh: self,
+            rays,
+            active,
+            one: Self::any_hit,
+        })
+    }
+}
+
+/// Rays of a task on a thread of its own: a few hundred microseconds.
+#[cfg(feature = "rayon")]
+const TASK: usize = 4096;
+
+#[cfg(feature = "rayon")]
+impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S>
+where
+    Self: Sync,
+{
+    /// [`closest_hits`](Self::closest_hits) on all threads of the current `rayon` pool.
+    pub fn par_closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        use rayon::prelude::*;
+        let tasks = rays.par_chunks(TASK).zip(hits.par_chunks_mut(TASK));
+        tasks.for_each(|(rays, hits)| self.closest_hits(rays, hits));
+    }
+
+    /// [`any_hits`](Self::any_hits) on all threads of the current `rayon` pool.
+    pub fn par_any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
+        use rayon::prelude::*;
+        let tasks = rays.par_chunks(TASK).zip(occluded.par_chunks_mut(TASK));
+        tasks.for_each(|(rays, occluded)| self.any_hits(rays, occluded));
+    }
+}
+
+/// As many rays as answers.
+#[inline(always)]
+fn paired<'a, A>(rays: &'a [Ray], answers: &'a mut [A]) -> (&'a [Ray], &'a mut [A]) {
+    let count = rays.len().min(answers.len());
+    (&rays[..count], &mut answers[..count])
+}
+
+/// Bundles of the rays that are alike, and waves of what lies between.
+struct Batch<'a, N: WideNode, S: Storage, Q: Query> {
+    bvh: &'a Bvh<N, TriangleLeaf, S>,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+}
+
+impl<N: WideNode, S: Storage, Q: Query> Operation for Batch<'_, N, S, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) {
+        let bvh = self.bvh;
+        let (rays, answers) = paired(self.rays, self.answers);
+        let Scratch(mut lanes) = Scratch::<LANES>::new();
+        // Rays before `waiting` are answered, those from there to `next` are for a wave.
+        let (mut waiting, mut next) = (0, 0);
+        loop {
+            let end = rays.len().min(next + bundle::RAYS);
+            let alike = next < end
+                && bundle::trace::<T, N, S, Q>(
+                    token,
+                    bvh,
+                    &rays[next..end],
+                    &mut answers[next..end],
+                );
+            if alike || next == end {
+                let between = &rays[waiting..next];
+                wave::trace::<T, N, S, Q, LANES>(
+                    token,
+                    bvh,
+                    between,
+                    &mut answers[waiting..next],
+                    &mut lanes,
+                );
+                waiting = end;
+            }
+            if next == end {
+                return;
+            }
+            next = end;
+        }
+    }
+}
+
+/// Waves alone.
+struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
+    bvh: &'a Bvh<N, TriangleLeaf, S>,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    scratch: &'a mut Scratch<LANES>,
+}
+
+impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Operation for Wave<'_, N, S, Q, LANES> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) {
+        let (rays, answers) = paired(self.rays, self.answers);
+        wave::trace::<T, N, S, Q, LANES>(token, self.bvh, rays, answers, &mut self.scratch.0);
+    }
+}
+
+/// One bundle, or if the rays are not alike one after the other.
+struct Packet<'a, N: WideNode, S: Storage, Q: Query, const RAYS: usize> {
+    bvh: &'a Bvh<N, TriangleLeaf, S>,
+    rays: &'a [Ray; RAYS],
+    active: u64,
+    one: fn(&Bvh<N, TriangleLeaf, S>, &Ray) -> Q::Answer,
+}
+
+impl<N: WideNode, S: Storage, Q: Query, const RAYS: usize> Operation for Packet<'_, N, S, Q, RAYS> {
+    type Output = [Q::Answer; RAYS];
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) -> [Q::Answer; RAYS] {
+        const { assert!(0 < RAYS && RAYS <= bundle::RAYS) };
+        // The active ones, and where they come from.
+        let (mut rays, mut lanes, mut count) = ([self.rays[0]; RAYS], [0; RAYS], 0);
+        for (lane, ray) in self.rays.iter().enumerate() {
+            if self.active >> lane & 1 != 0 {
+                (rays[count], lanes[count]) = (*ray, lane);
+                count += 1;
+            }
+        }
+        let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
+        if !bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]) {
+            for (ray, answer) in rays.iter().zip(&mut found) {
+                *answer = (self.one)(self.bvh, ray);
+            }
+        }
+        let mut answers = [Q::MISS; RAYS];
+        for (&lane, &answer) in lanes[..count].iter().zip(&found) {
+            answers[lane] = answer;
+        }
+        answers
+    }
+}

@@ -1,0 +1,477 @@
+//! Rays of about one origin and one direction, side by side through the tree.
+//!
+//! A node is tested once for all of them, by intervals; a child that any of them may meet is tested again for each, eight
+//! rays at a time; and so are the triangles of a leaf that is left. The camera's rays, and shadow rays towards one light,
+//! share most of their way.
+//!
+//! After Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005), and Overbeck, Ramamoorthi, Mark, "Large ray
+//! packets for real-time Whitted ray tracing" (2008): the rays that a node is for are kept as a mask.
+
+use super::{query::Query, triangles::Found};
+use crate::{
+    geometry::{Aabb, Ray},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, WideNode},
+    primitive::triangle::{Along, RayShear, Sheared, bits},
+    simd::{Lanes, Simd, Vector, splat3},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocal},
+};
+use core::mem::MaybeUninit;
+
+/// The most rays of a bundle: a bit each.
+pub(super) const RAYS: usize = 64;
+/// Rays tested at a time.
+const LANES: usize = 8;
+const PACKETS: usize = RAYS / LANES;
+/// No more rays than this of a packet at a leaf are tested one by one.
+const FEW: u32 = 2;
+/// How far apart the rays of a bundle may go, across for one along their largest component.
+const SPREAD: f32 = 0.5;
+
+/// A number of each ray of a packet.
+type V<T> = <T as Simd>::F32x8;
+
+/// Eight rays.
+struct Packet<T: Simd> {
+    origin: [V<T>; 3],
+    slabs: RaySlabs<LANES, V<T>>,
+    /// Up to which `t` boxes are of interest: `t_max` and the margin.
+    far: V<T>,
+    along: Along<V<T>>,
+    slope: [V<T>; 2],
+    /// The best hits so far, in the lanes that have one.
+    t_max: V<T>,
+    u: V<T>,
+    v: V<T>,
+    /// Their places in the list of primitive numbers, as bits.
+    places: V<T>,
+}
+
+/// Rays under way.
+struct Bundle<'a, T: Simd> {
+    rays: &'a [Ray],
+    axes: &'static [usize; 3],
+    slabs: BundleSlabs,
+    /// Those below `count` were written. Lanes past the last ray repeat the first.
+    packets: [MaybeUninit<Packet<T>>; PACKETS],
+    count: usize,
+    /// The greatest of the packets'.
+    far: f32,
+    /// Those that look on.
+    looking: u64,
+    /// Those that have found something.
+    found: u64,
+}
+
+/// A child to go to, for some of the rays.
+#[derive(Clone, Copy)]
+struct Entry {
+    link: Link,
+    near: f32,
+    /// The node whose child it is.
+    parent: Link,
+    lane: u32,
+    rays: u64,
+}
+
+/// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike; else does nothing. Whether
+/// they are.
+#[inline(always)]
+pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
+    token: T,
+    bvh: &Bvh<N, TriangleLeaf, S>,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) -> bool {
+    if bvh.root() == Child::EMPTY {
+        return false;
+    }
+    let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
+        return false;
+    };
+    bundle.walk::<N, S, Q>(token, bvh);
+    let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
+    for (index, (rays, answers)) in packets.enumerate() {
+        let found = bundle.found >> (LANES * index);
+        let packet = bundle.packet(index);
+        let (t, u, v) = (
+            packet.t_max.to_array(),
+            packet.u.to_array(),
+            packet.v.to_array(),
+        );
+        let places = packet.places.to_array();
+        for (lane, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+            let lane = lane % LANES;
+            *answer = if found >> lane & 1 == 0 {
+                Q::MISS
+            } else {
+                let found = Found {
+                    t: t[lane],
+                    u: u[lane],
+                    v: v[lane],
+                    place: places[lane].to_bits() as usize,
+                };
+                Q::answer(found, ray, 1.0, bvh.primitives())
+            };
+        }
+    }
+    true
+}
+
+impl<'a, T: Simd> Bundle<'a, T> {
+    /// `None` if the rays are not alike, or one of them is out of the ordinary, or all is too far away.
+    #[inline(always)]
+    fn new(token: T, bounds: &Aabb, rays: &'a [Ray]) -> Option<Self> {
+        let first = rays.first()?;
+        let mut room = PreparedRay::ROOM;
+        let prepared = PreparedRay::new(first, &mut room)?;
+        let axes = prepared.axes;
+        let count = rays.len().div_ceil(LANES).min(PACKETS);
+        let mut packets = [const { MaybeUninit::uninit() }; PACKETS];
+        let nothing = V::<T>::splat(token, f32::NEG_INFINITY);
+        let (mut extent, mut far) = (nothing, nothing);
+        // Of the slopes and the slopes' negatives.
+        let mut steepest = [[nothing; 2]; 2];
+        for index in 0..count {
+            let (packet, extents) = Packet::new(token, bounds, &rays[LANES * index..], &prepared)?;
+            extent = extent.max(extents);
+            far = far.max(packet.far);
+            let ([x, y], zero) = (packet.slope, V::<T>::splat(token, 0.0));
+            let [up, down] = &mut steepest;
+            *up = [up[0].max(x), up[1].max(y)];
+            *down = [down[0].max(zero - x), down[1].max(zero - y)];
+            packets[index].write(packet);
+        }
+        let extent = most(extent);
+        let spread = |axis: usize| most(steepest[0][axis]) + most(steepest[1][axis]);
+        if !(extent < MAX_EXTENT && spread(0) <= SPREAD && spread(1) <= SPREAD) {
+            return None;
+        }
+        let mut bundling = Bundling::new(token, first.origin, extent);
+        for packet in &packets[..count] {
+            // SAFETY: just written.
+            let Packet { origin, slabs, .. } = unsafe { packet.assume_init_ref() };
+            bundling.add(token, *origin, slabs.reciprocals(), slabs.t_min());
+        }
+        Some(Self {
+            rays,
+            axes,
+            slabs: bundling.finish(first.direction),
+            packets,
+            count,
+            far: most(far),
+            looking: u64::MAX >> (RAYS - rays.len().min(RAYS)),
+            found: 0,
+        })
+    }
+
+    #[inline(always)]
+    fn packet(&mut self, index: usize) -> &mut Packet<T> {
+        debug_assert!(index < self.count);
+        // SAFETY: callers' indices are below `count`, and those were written.
+        unsafe { self.packets.get_unchecked_mut(index).assume_init_mut() }
+    }
+
+    /// Finds what all rays find.
+    #[inline(always)]
+    fn walk<N: WideNode, S: Storage, Q: Query>(&mut self, token: T, bvh: &Bvh<N, TriangleLeaf, S>) {
+        let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves());
+        let direction = self.rays[0].direction;
+        let mut stack = [MaybeUninit::<Entry>::uninit(); STACK];
+        let mut len = 0;
+        let mut current = Link::new::<N>(bvh.root());
+        let mut rays = self.looking;
+        loop {
+            if current.is_leaf() {
+                // SAFETY: the layout's check saw that all leaves led to are there.
+                let leaf = unsafe { leaves.get_unchecked(current.leaf()) };
+                self.test_leaf::<Q>(token, leaf, bvh.primitives(), rays);
+            } else {
+                // SAFETY: the layout's check saw that all nodes led to are there.
+                let node = unsafe { &*nodes.byte_add(current.node_offset()) };
+                let far = N::Lanes::<T>::splat(token, self.far);
+                let (hit, near) = node.test_bundle(token, &self.slabs, far);
+                let near = near.to_array();
+                let base = len;
+                for lane in bits(hit.bits()) {
+                    // SAFETY: `hit` has bits for the node's lanes alone, `near` is of as many.
+                    let (link, near) = unsafe {
+                        let link = *node.links().get_unchecked(lane);
+                        (link, *near.as_ref().get_unchecked(lane))
+                    };
+                    token.prefetch(if link.is_leaf() {
+                        leaves.as_ptr().wrapping_add(link.leaf()).cast()
+                    } else {
+                        nodes.wrapping_byte_add(link.node_offset()).cast()
+                    });
+                    let entry = Entry {
+                        link,
+                        near,
+                        parent: current,
+                        lane: lane as u32,
+                        rays,
+                    };
+                    // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children
+                    // behind; those from `base` to `len` were just written.
+                    unsafe { insert(&mut stack, base, len, entry) };
+                    len += 1;
+                }
+            }
+            // The last child left behind that any of its rays passes, with as near as they have come.
+            loop {
+                if len == 0 {
+                    return;
+                }
+                len -= 1;
+                // SAFETY: those below the length were written.
+                let entry = unsafe { stack.get_unchecked(len).assume_init() };
+                current = entry.link;
+                rays = entry.rays & self.looking;
+                if entry.near <= self.far && rays != 0 {
+                    // SAFETY: it was walked through.
+                    let parent = unsafe { &*nodes.byte_add(entry.parent.node_offset()) };
+                    let [near, far] = parent.child_planes(entry.lane as usize, direction);
+                    rays = self.passing(token, near, far, rays);
+                    if rays != 0 {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Which of the rays pass a box, given by the planes that they meet first and those they meet last.
+    #[inline(always)]
+    fn passing(&mut self, token: T, near: [f32; 3], far: [f32; 3], rays: u64) -> u64 {
+        let (near, far) = (splat3(token, near), splat3(token, far));
+        let mut passing = 0;
+        for index in 0..self.count {
+            if (rays >> (LANES * index)) as u8 != 0 {
+                let packet = self.packet(index);
+                let (hit, _) = packet.slabs.between(near, far, packet.far);
+                passing |= u64::from(hit.bits()) << (LANES * index);
+            }
+        }
+        passing & rays
+    }
+
+    /// Tests the leaf's triangles for some of the rays.
+    #[inline(always)]
+    fn test_leaf<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: &TriangleLeaf,
+        primitives: &[u32],
+        rays: u64,
+    ) {
+        let mut closer = 0;
+        for index in 0..self.count {
+            let lanes = u32::from((rays >> (LANES * index)) as u8);
+            if lanes == 0 {
+                continue;
+            }
+            let found = u32::from((self.found >> (LANES * index)) as u8);
+            let (axes, of_packet) = (self.axes, &self.rays[LANES * index..]);
+            let packet = self.packet(index);
+            let new = if lanes.count_ones() <= FEW {
+                packet.test_by_ray::<Q>(token, leaf, primitives, lanes, found, of_packet, axes)
+            } else {
+                packet.test_leaf::<Q>(token, leaf, primitives, lanes, found, axes)
+            };
+            packet.far = packet.t_max + packet.slabs.margins();
+            closer |= u64::from(new) << (LANES * index);
+        }
+        self.found |= closer;
+        if !Q::CLOSEST {
+            self.looking &= !closer;
+        } else if closer != 0 {
+            let mut far = V::<T>::splat(token, f32::NEG_INFINITY);
+            for index in 0..self.count {
+                far = far.max(self.packet(index).far);
+            }
+            self.far = most(far);
+        }
+    }
+}
+
+impl<T: Simd> Packet<T> {
+    /// Of the first eight rays, or as many as there are, if they are like the one that is prepared; and each one's D.
+    #[inline(always)]
+    fn new(token: T, bounds: &Aabb, rays: &[Ray], like: &PreparedRay) -> Option<(Self, V<T>)> {
+        let mut padded = [[0.0; 8]; LANES];
+        let rows: &[[f32; 8]; LANES] = match rays.first_chunk::<LANES>() {
+            Some(rays) => bytemuck::cast_ref(rays),
+            None => {
+                for (lane, row) in padded.iter_mut().enumerate() {
+                    *row = bytemuck::cast(*rays.get(lane).unwrap_or(like.ray));
+                }
+                &padded
+            }
+        };
+        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.columns(rows);
+        let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        if !like.is_like(token, origin, direction, [t_min, t_max]) {
+            return None;
+        }
+        let reciprocals = [
+            reciprocal(token, dx),
+            reciprocal(token, dy),
+            reciprocal(token, dz),
+        ];
+        let signs = like.ray.direction;
+        let (slabs, extent) = RaySlabs::of_lanes(token, origin, reciprocals, t_min, signs, bounds);
+        let [kx, ky, kz] = *like.axes;
+        let zero = V::<T>::splat(token, 0.0);
+        let packet = Self {
+            origin,
+            slabs,
+            far: t_max + slabs.margins(),
+            along: Along {
+                reciprocal: reciprocals[kz],
+                t_min,
+            },
+            slope: [
+                direction[kx] * reciprocals[kz],
+                direction[ky] * reciprocals[kz],
+            ],
+            t_max,
+            u: zero,
+            v: zero,
+            places: zero,
+        };
+        Some((packet, extent))
+    }
+
+    /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
+    #[inline(always)]
+    fn test_leaf<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: &TriangleLeaf,
+        primitives: &[u32],
+        mut lanes: u32,
+        mut found: u32,
+        axes: &[usize; 3],
+    ) -> u32 {
+        let [kx, ky, kz] = *axes;
+        // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
+        unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
+        let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
+        let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
+        let nowhere = [V::<T>::splat(token, 0.0); 3];
+        let mut vertices = [Sheared::new(nowhere, nowhere, [nowhere[0]; 2]); 8];
+        for vertex in 0..8 {
+            let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
+            vertices[vertex] = Sheared::new(position, origin, self.slope);
+        }
+        let mut new = 0;
+        for triangle in 0..leaf.count() % 16 {
+            let place = leaf.first() + triangle;
+            let triangle = triangle % 8;
+            let a = vertices[leaf.corners[0][triangle] as usize % 8];
+            let b = vertices[leaf.corners[1][triangle] as usize % 8];
+            let c = vertices[leaf.corners[2][triangle] as usize % 8];
+            let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
+            let edges = self.along.edges(token, corners, lanes);
+            if edges.candidates == 0 {
+                continue;
+            }
+            let hits = self
+                .along
+                .test::<LANES, true>(token, corners, edges, self.t_max);
+            let Some(hits) = hits else {
+                continue;
+            };
+            let nearer = hits.t.lt(self.t_max).bits() | !found;
+            let mut closer = hits.mask & nearer;
+            for lane in bits(hits.mask & !nearer) {
+                // As near as the best one: the lesser number.
+                let best = self.places.to_array()[lane % LANES].to_bits() as usize;
+                closer |= u32::from(primitives[place] < primitives[best]) << lane;
+            }
+            let set = V::<T>::of_bits(token, closer);
+            self.t_max = set.select(hits.t, self.t_max);
+            self.u = set.select(hits.u, self.u);
+            self.v = set.select(hits.v, self.v);
+            let places = V::<T>::splat(token, f32::from_bits(place as u32));
+            self.places = set.select(places, self.places);
+            found |= closer;
+            new |= closer;
+            if !Q::CLOSEST {
+                lanes &= !closer;
+            }
+        }
+        new
+    }
+
+    /// All triangles at once, a lane after the other. The lanes that have a new best hit.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn test_by_ray<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: &TriangleLeaf,
+        primitives: &[u32],
+        lanes: u32,
+        found: u32,
+        rays: &[Ray],
+        axes: &'static [usize; 3],
+    ) -> u32 {
+        let (t_max, reciprocals) = (self.t_max.to_array(), self.along.reciprocal.to_array());
+        let mut new = 0;
+        for lane in bits(lanes) {
+            let lane = lane % LANES;
+            let Some(ray) = rays.get(lane) else {
+                break;
+            };
+            let shear = RayShear::of(ray, axes, V::<T>::splat(token, reciprocals[lane]));
+            let mut t_max = t_max[lane];
+            if !Q::CLOSEST {
+                let hit = leaf.test::<T, false>(token, &shear, t_max).is_some();
+                new |= u32::from(hit) << lane;
+                continue;
+            }
+            let Some(hits) = leaf.test::<T, true>(token, &shear, t_max) else {
+                continue;
+            };
+            let mut best = None;
+            if found >> lane & 1 != 0 {
+                best = Some(Found {
+                    t: t_max,
+                    place: self.places.to_array()[lane].to_bits() as usize,
+                    ..Found::default()
+                });
+            }
+            let closer = Found::choose::<T>(&mut best, &mut t_max, leaf, hits, primitives);
+            if let (true, Some(best)) = (closer, best) {
+                let place = f32::from_bits(best.place as u32);
+                self.t_max = self.t_max.replace(token, lane, best.t);
+                self.u = self.u.replace(token, lane, best.u);
+                self.v = self.v.replace(token, lane, best.v);
+                self.places = self.places.replace(token, lane, place);
+                new |= 1 << lane;
+            }
+        }
+        new
+    }
+}
+
+/// Puts an entry where it belongs among those from `base` to `len`, of which the nearest is the last.
+///
+/// # Safety
+/// Those were written, and there is a place after them.
+#[inline(always)]
+unsafe fn insert(stack: &mut [MaybeUninit<Entry>; STACK], base: usize, len: usize, entry: Entry) {
+    let mut place = len;
+    // SAFETY: the caller's promise: `place` is from `base` to `len`.
+    unsafe {
+        while place > base {
+            let before = stack.get_unchecked(place - 1).assume_init();
+            if before.near >= entry.near {
+                break;
+            }
+            stack.get_unchecked_mut(place).write(before);
+            place -= 1;
+        }
+        stack.get_unchecked_mut(place).write(entry);
+    }
+}

@@ -1,0 +1,396 @@
+//! Many rays at once, a step at a time in turn.
+//!
+//! A ray alone waits: for its node to be loaded, for the boxes to be tested, for what was guessed wrong. Here some are under
+//! way together, and one's wait is another's work. What follows from a step is not branched on, for it cannot be guessed:
+//! a node's children are written to the ray's stack by a permutation, and the ray goes to the list of those at a node,
+//! at a leaf, at a leaf whose triangles need a closer look, or at their end.
+//!
+//! Children on the stack are in the order of lanes, but for the nearest, which comes next.
+//!
+//! Several rays in flight to hide latency: Wald, Slusallek, Benthin, Wagner, "Interactive rendering with coherent ray
+//! tracing" (2001). Children written by a permutation: Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray
+//! tracing kernels for modern CPU architectures" (2015).
+
+use super::{query::Query, triangles::Found};
+use crate::{
+    geometry::Ray,
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, WideNode},
+    primitive::triangle::{Corners, Edges, RayShear},
+    simd::{Lanes, Simd},
+    slab::{NarrowSlabs, PreparedRay, SceneExtent},
+};
+use core::{hint::select_unpredictable, mem::MaybeUninit};
+
+/// The most lanes of a wave.
+const MOST_LANES: usize = 64;
+
+/// A stack's places: [`BOTTOM`], the entries, and room to write a whole vector above the last.
+const PLACES: usize = STACK + 16;
+
+/// What lies below all entries of a stack. It counts as a leaf.
+const BOTTOM: Link = Link::from_bits(u32::MAX);
+
+/// A ray under way.
+pub(super) struct Lane {
+    current: Link,
+    /// The place of the stack's last entry.
+    top: usize,
+    /// Up to which `t` boxes are of interest: `t_max` and the margin.
+    far: f32,
+    /// Up to which `t` triangles are.
+    t_max: f32,
+    slabs: NarrowSlabs,
+    /// As it was prepared.
+    ray: Ray,
+    axes: &'static [usize; 3],
+    /// Of the direction's component along the last of them.
+    reciprocal: f32,
+    unscale: f32,
+    found: Option<Found>,
+    /// The caller's number of it.
+    index: usize,
+    links: [MaybeUninit<Link>; PLACES],
+    nears: [MaybeUninit<f32>; PLACES],
+}
+
+/// Rays to be traced, and those that are.
+struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
+    bvh: &'a Bvh<N, TriangleLeaf, S>,
+    scene: SceneExtent,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    /// The next ray to start.
+    next: usize,
+    lanes: &'a mut [MaybeUninit<Lane>; LANES],
+    at_node: List,
+    at_leaf: List,
+    /// At a leaf with candidates.
+    at_triangles: List,
+    at_end: List,
+}
+
+/// What a first look at a leaf has brought.
+type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
+
+/// Traces all `rays`, of which there are as many as `answers`.
+#[inline(always)]
+pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usize>(
+    token: T,
+    bvh: &Bvh<N, TriangleLeaf, S>,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+    lanes: &mut [MaybeUninit<Lane>; LANES],
+) {
+    const { assert!(0 < LANES && LANES <= MOST_LANES) };
+    if bvh.root() == Child::EMPTY {
+        answers.fill(Q::MISS);
+        return;
+    }
+    let mut wave = Wave::<N, S, Q, LANES> {
+        bvh,
+        scene: SceneExtent::new(bvh.bounds()),
+        rays,
+        answers,
+        next: 0,
+        lanes,
+        at_node: List::EMPTY,
+        at_leaf: List::EMPTY,
+        at_triangles: List::EMPTY,
+        at_end: List::EMPTY,
+    };
+    for lane in 0..LANES {
+        wave.start(token, lane);
+    }
+    wave.run(token);
+}
+
+impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LANES> {
+    #[inline(always)]
+    fn run<T: Simd>(&mut self, token: T) {
+        // Apart, so that lists are short and what they are of is together.
+        let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
+        loop {
+            // Leaves wait for company until few rays are at nodes.
+            let few = self.at_node.len <= LANES / 4;
+            if !few || self.at_leaf.len + self.at_end.len == 0 {
+                if self.at_node.len == 0 {
+                    return;
+                }
+                for place in 0..self.at_node.take() {
+                    let (lane, bvh) = (self.at_node.get(place), self.bvh);
+                    let state = self.lane(lane);
+                    state.test_node::<T, N, S, Q>(token, bvh);
+                    let current = state.current;
+                    self.sort(lane, current, true);
+                }
+                continue;
+            }
+            for place in 0..self.at_leaf.take() {
+                let (lane, bvh) = (self.at_leaf.get(place), self.bvh);
+                // SAFETY: no more lanes are in a list than there are.
+                let look = unsafe { looks.get_unchecked_mut(self.at_triangles.len) };
+                let state = self.lane(lane);
+                let stays = state.look_at_leaf(token, bvh, look);
+                let current = state.current;
+                self.at_triangles.push_if(lane, stays);
+                self.sort(lane, current, !stays);
+            }
+            for place in 0..self.at_triangles.take() {
+                let (lane, bvh) = (self.at_triangles.get(place), self.bvh);
+                // SAFETY: written when the lane came to this place of the list.
+                let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
+                let state = self.lane(lane);
+                state.test_triangles::<T, N, S, Q>(token, bvh, look);
+                let current = state.current;
+                self.sort(lane, current, true);
+            }
+            for place in 0..self.at_end.take() {
+                let lane = self.at_end.get(place);
+                self.finish(lane);
+                self.start(token, lane);
+            }
+        }
+    }
+
+    /// A lane that is in a list.
+    #[inline(always)]
+    fn lane(&mut self, lane: usize) -> &mut Lane {
+        // SAFETY: lists have numbers of lanes in which `start` has put a ray.
+        unsafe { self.lanes.get_unchecked_mut(lane).assume_init_mut() }
+    }
+
+    /// Puts a lane into the list for what it has come to, if `go`.
+    #[inline(always)]
+    fn sort(&mut self, lane: usize, current: Link, go: bool) {
+        let (leaf, end) = (current.is_leaf(), current == BOTTOM);
+        self.at_node.push_if(lane, go & !leaf);
+        self.at_leaf.push_if(lane, go & leaf & !end);
+        self.at_end.push_if(lane, go & end);
+    }
+
+    /// Starts the next ray that may hit something, if there is one.
+    #[inline(always)]
+    fn start<T: Simd>(&mut self, token: T, lane: usize) {
+        while let Some(ray) = self.rays.get(self.next) {
+            let index = self.next;
+            self.next += 1;
+            let mut room = PreparedRay::ROOM;
+            let Some(prepared) = PreparedRay::new(ray, &mut room) else {
+                if let Some(answer) = self.answers.get_mut(index) {
+                    *answer = Q::MISS;
+                }
+                continue;
+            };
+            let root = Link::new::<N>(self.bvh.root());
+            // SAFETY: `lane` is one of them.
+            let state = unsafe { self.lanes.get_unchecked_mut(lane) };
+            Lane::start::<T, N>(token, state, root, &self.scene, &prepared, index);
+            self.sort(lane, root, true);
+            return;
+        }
+    }
+
+    /// Writes down a lane's answer.
+    #[inline(always)]
+    fn finish(&mut self, lane: usize) {
+        let state = self.lane(lane);
+        let (found, index, unscale) = (state.found, state.index, state.unscale);
+        if let (Some(ray), Some(answer)) = (self.rays.get(index), self.answers.get_mut(index)) {
+            *answer = match found {
+                None => Q::MISS,
+                Some(found) => Q::answer(found, ray, unscale, self.bvh.primitives()),
+            };
+        }
+    }
+}
+
+impl Lane {
+    /// Puts a ray into a lane. Its stacks stay as they are but for the bottom.
+    #[inline(always)]
+    fn start<T: Simd, N: WideNode>(
+        token: T,
+        lane: &mut MaybeUninit<Self>,
+        root: Link,
+        scene: &SceneExtent,
+        prepared: &PreparedRay,
+        index: usize,
+    ) {
+        let reciprocal = prepared.reciprocal::<T::F32x4>(token);
+        let slabs = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
+        let lane = lane.as_mut_ptr();
+        // SAFETY: fields of memory that is there; the stacks need not be written.
+        unsafe {
+            (&raw mut (*lane).current).write(root);
+            (&raw mut (*lane).top).write(0);
+            (&raw mut (*lane).far).write(prepared.ray.t_max + slabs.margin());
+            (&raw mut (*lane).t_max).write(prepared.ray.t_max);
+            (&raw mut (*lane).slabs).write(slabs);
+            (&raw mut (*lane).ray).write(*prepared.ray);
+            (&raw mut (*lane).axes).write(prepared.axes);
+            let z = prepared.axes[2] % 4;
+            (&raw mut (*lane).reciprocal).write(reciprocal.to_array()[z]);
+            (&raw mut (*lane).unscale).write(prepared.unscale());
+            (&raw mut (*lane).found).write(None);
+            (&raw mut (*lane).index).write(index);
+            (&raw mut (*lane).links[0]).write(MaybeUninit::new(BOTTOM));
+        }
+    }
+
+    /// Tests the node's boxes, and goes on to the nearest child or else to the stack's last entry.
+    #[inline(always)]
+    fn test_node<T: Simd, N: WideNode, S: Storage, Q: Query>(
+        &mut self,
+        token: T,
+        bvh: &Bvh<N, TriangleLeaf, S>,
+    ) {
+        let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves().as_ptr());
+        // SAFETY: the layout's check saw that all nodes led to are there.
+        let node = unsafe { &*nodes.byte_add(self.current.node_offset()) };
+        let slabs = N::widen(token, &self.slabs);
+        let far = N::Lanes::<T>::splat(token, self.far);
+        let (hit, near) = node.test(token, &slabs, far);
+        let mask = hit.bits();
+        let links = node.link_lanes(token);
+        let above = self.top + 1;
+        // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children behind, which `top` is at
+        // most, and a vector's worth of places is above them. `top` and those below were written. `child` is a lane.
+        unsafe {
+            let last = self.links.get_unchecked(self.top).assume_init();
+            let above_links = self.links.as_mut_ptr().add(above).cast();
+            let child = if Q::CLOSEST {
+                let nearest = near.least(hit);
+                let others = mask & !(1 << nearest);
+                near.compress(others, self.nears.as_mut_ptr().add(above).cast());
+                links.compress(others, above_links);
+                nearest
+            } else {
+                // The last of those written is popped at once.
+                links.compress(mask, above_links);
+                (31 ^ (mask | 1).leading_zeros()) as usize
+            };
+            let child = *node.links().get_unchecked(child % N::WIDTH);
+            self.current = select_unpredictable(mask != 0, child, last);
+        }
+        self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);
+
+        // Not by a branch, nor anything that may become one.
+        let node = nodes as usize + self.current.node_offset();
+        let leaf = leaves as usize + self.current.leaf() * size_of::<TriangleLeaf>();
+        let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
+        token.prefetch((node ^ ((node ^ leaf) & is_leaf)) as *const u8);
+    }
+
+    /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
+    #[inline(always)]
+    fn look_at_leaf<T: Simd, N: WideNode, S: Storage>(
+        &mut self,
+        token: T,
+        bvh: &Bvh<N, TriangleLeaf, S>,
+        look: &mut MaybeUninit<Look<T>>,
+    ) -> bool {
+        let (_, edges) = look.write(self.leaf(bvh).edges(token, &self.shear(token)));
+        let stays = edges.candidates != 0;
+        // SAFETY: `top` and those below were written.
+        let last = unsafe { self.links.get_unchecked(self.top).assume_init() };
+        self.current = select_unpredictable(stays, self.current, last);
+        self.top = self.top.wrapping_sub(usize::from(!stays));
+        stays
+    }
+
+    /// Tests the leaf's triangles, and goes on to the stack's last entry, or the end if enough is known.
+    #[inline(always)]
+    fn test_triangles<T: Simd, N: WideNode, S: Storage, Q: Query>(
+        &mut self,
+        token: T,
+        bvh: &Bvh<N, TriangleLeaf, S>,
+        &(corners, edges): &Look<T>,
+    ) {
+        let t_max = T::F32x8::splat(token, self.t_max);
+        let along = self.shear(token).along(token);
+        if Q::CLOSEST {
+            let hits = along.test::<8, true>(token, corners, edges, t_max);
+            if let Some(hits) = hits {
+                let (leaf, primitives) = (self.leaf(bvh), bvh.primitives());
+                let best = &mut self.found;
+                if Found::choose::<T>(best, &mut self.t_max, leaf, hits, primitives) {
+                    self.far = self.t_max + self.slabs.margin();
+                    self.forget_the_far();
+                }
+            }
+        } else if along
+            .test::<8, false>(token, corners, edges, t_max)
+            .is_some()
+        {
+            self.found = Some(Found::default());
+            self.current = BOTTOM;
+            return;
+        }
+        // SAFETY: `top` and those below were written.
+        self.current = unsafe { self.links.get_unchecked(self.top).assume_init() };
+        self.top = self.top.wrapping_sub(1);
+    }
+
+    /// Takes from the stack what is too far now.
+    #[inline(always)]
+    fn forget_the_far(&mut self) {
+        let mut kept = 0;
+        for place in 1..=self.top {
+            // SAFETY: `top` and those below were written; `kept + 1` is at most `place`.
+            unsafe {
+                let near = self.nears.get_unchecked(place).assume_init();
+                *self.links.get_unchecked_mut(kept + 1) = *self.links.get_unchecked(place);
+                self.nears.get_unchecked_mut(kept + 1).write(near);
+                kept += usize::from(near <= self.far);
+            }
+        }
+        self.top = kept;
+    }
+
+    #[inline(always)]
+    fn leaf<'a, N: WideNode, S: Storage>(
+        &self,
+        bvh: &'a Bvh<N, TriangleLeaf, S>,
+    ) -> &'a TriangleLeaf {
+        // SAFETY: the layout's check saw that all leaves led to are there.
+        unsafe { bvh.leaves().get_unchecked(self.current.leaf()) }
+    }
+
+    #[inline(always)]
+    fn shear<T: Simd>(&self, token: T) -> RayShear<'_, T::F32x8> {
+        let reciprocal = T::F32x8::splat(token, self.reciprocal);
+        RayShear::of(&self.ray, self.axes, reciprocal)
+    }
+}
+
+/// Lanes that are to do the same next.
+struct List {
+    lanes: [u8; MOST_LANES + 1],
+    len: usize,
+}
+
+impl List {
+    const EMPTY: Self = Self {
+        lanes: [0; MOST_LANES + 1],
+        len: 0,
+    };
+
+    /// Empties the list. Its places can be read until others are pushed over them.
+    #[inline(always)]
+    fn take(&mut self) -> usize {
+        core::mem::take(&mut self.len)
+    }
+
+    #[inline(always)]
+    fn get(&self, place: usize) -> usize {
+        // SAFETY: `place` was below `len`, which is at most the number of lanes.
+        usize::from(unsafe { *self.lanes.get_unchecked(place) })
+    }
+
+    /// Written always, kept or not: no branch.
+    #[inline(always)]
+    fn push_if(&mut self, lane: usize, wanted: bool) {
+        // SAFETY: a lane is in one list once at most, so `len` is at most `MOST_LANES`.
+        unsafe { *self.lanes.get_unchecked_mut(self.len) = lane as u8 };
+        self.len += usize::from(wanted);
+    }
+}
