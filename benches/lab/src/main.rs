@@ -1,8 +1,13 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
+mod effort;
 mod engines;
 mod race;
 mod reference;
+mod scenes;
+mod stats;
+mod text;
+mod workloads;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
