@@ -2,6 +2,7 @@
 
 mod effort;
 mod engines;
+mod limit;
 mod race;
 mod reference;
 mod scenes;
@@ -22,11 +23,13 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
+    Limit(limit::Args),
     Race(race::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Args::parse().command {
+        Command::Limit(args) => limit::run(&args),
         Command::Race(args) => race::run(&args),
     };
     match outcome {
