@@ -24,8 +24,12 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
             let reciprocal = prepared.reciprocals(token);
             let slabs = N::slabs(token, prepared.ray, reciprocal, self.1);
             let t_max = N::Lanes::<T>::splat(token, prepared.ray.t_max + N::margin(&slabs));
-            let passed = |node: &N| node.test(token, &slabs, t_max).0.bits().count_ones();
-            self.0.iter().map(passed).sum()
+            let mut passed = 0;
+            // No closure: it would not inherit the target's features.
+            for node in self.0 {
+                passed += node.test(token, &slabs, t_max).0.bits().count_ones();
+            }
+            passed
         }
     }
     backend.run(Boxes(nodes, bounds, ray))
@@ -43,11 +47,13 @@ pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> 
                 return 0;
             };
             let shear = RayShear::new(&prepared, prepared.reciprocals(token));
-            let hits = |leaf: &TriangleLeaf| {
-                leaf.test::<T, true>(token, &shear, prepared.ray.t_max)
-                    .map_or(0, |hits| hits.mask.count_ones())
-            };
-            self.0.iter().map(hits).sum()
+            let mut count = 0;
+            for leaf in self.0 {
+                if let Some(hits) = leaf.test::<T, true>(token, &shear, prepared.ray.t_max) {
+                    count += hits.mask.count_ones();
+                }
+            }
+            count
         }
     }
     backend.run(Triangles(leaves, ray))

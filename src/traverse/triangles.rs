@@ -33,6 +33,11 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
     pub fn closest_hit_counted(&self, ray: &Ray) -> (Option<Hit>, Counts) {
         self.backend().run(ClosestCounted { bvh: self, ray })
     }
+
+    /// [`any_hit`](Self::any_hit), and what it cost.
+    pub fn any_hit_counted(&self, ray: &Ray) -> (bool, Counts) {
+        self.backend().run(AnyCounted { bvh: self, ray })
+    }
 }
 
 /// The best hit so far.
@@ -165,14 +170,33 @@ impl<N: WideNode, S: Storage> Operation for Any<'_, N, S> {
             return false;
         };
         let reciprocal = prepared.reciprocals(token);
-        let mut visitor = AnyVisitor {
-            token,
-            shear: RayShear::new(&prepared, reciprocal),
-            t_max: prepared.ray.t_max,
-            found: false,
-        };
+        let mut visitor = AnyVisitor::new(token, &prepared, reciprocal);
         walk(token, self.bvh, prepared.ray, reciprocal, &mut visitor);
         visitor.found
+    }
+}
+
+struct AnyCounted<'a, N: WideNode, S: Storage> {
+    bvh: &'a Bvh<N, TriangleLeaf, S>,
+    ray: &'a Ray,
+}
+
+impl<N: WideNode, S: Storage> Operation for AnyCounted<'_, N, S> {
+    type Output = (bool, Counts);
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) -> (bool, Counts) {
+        let mut room = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+            return (false, Counts::default());
+        };
+        let reciprocal = prepared.reciprocals(token);
+        let mut counting = Counting {
+            visitor: AnyVisitor::new(token, &prepared, reciprocal),
+            counts: Counts::default(),
+        };
+        walk(token, self.bvh, prepared.ray, reciprocal, &mut counting);
+        (counting.visitor.found, counting.counts)
     }
 }
 
@@ -231,6 +255,18 @@ struct AnyVisitor<'a, T: Simd> {
     shear: RayShear<'a, T::F32x8>,
     t_max: f32,
     found: bool,
+}
+
+impl<'a, T: Simd> AnyVisitor<'a, T> {
+    #[inline(always)]
+    fn new(token: T, prepared: &PreparedRay<'a>, reciprocal: [T::F32x8; 3]) -> Self {
+        Self {
+            token,
+            shear: RayShear::new(prepared, reciprocal),
+            t_max: prepared.ray.t_max,
+            found: false,
+        }
+    }
 }
 
 impl<T: Simd> Visitor<TriangleLeaf> for AnyVisitor<'_, T> {

@@ -1,8 +1,14 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
+mod effort;
 mod engines;
+mod limit;
 mod race;
 mod reference;
+mod scenes;
+mod stats;
+mod text;
+mod workloads;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -17,11 +23,13 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
+    Limit(limit::Args),
     Race(race::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Args::parse().command {
+        Command::Limit(args) => limit::run(&args),
         Command::Race(args) => race::run(&args),
     };
     match outcome {

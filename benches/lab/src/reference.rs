@@ -18,10 +18,9 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// As many rays, spread evenly, as brute force answers with `tests` triangle tests.
-    pub fn trace(mesh: &TriangleMesh<'_>, rays: &[Ray], tests: usize) -> Self {
-        let size = (tests / mesh.len().max(1)).clamp(1, rays.len().max(1));
-        let size = size.min(rays.len());
+    /// As many rays, spread evenly, as brute force answers with `tests` triangle tests, but `least` at least.
+    pub fn trace(mesh: &TriangleMesh<'_>, rays: &[Ray], tests: usize, least: usize) -> Self {
+        let size = (tests / mesh.len().max(1)).max(least).min(rays.len());
         let sample: Vec<usize> = (0..size).map(|i| i * rays.len() / size).collect();
         let threads = thread::available_parallelism().map_or(1, NonZero::get);
         let share = size.div_ceil(threads).max(1);
@@ -148,11 +147,12 @@ mod tests {
         let mesh = TriangleMesh::new(&positions, &[[0, 1, 2_u32]]).unwrap();
         let hit = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
         let miss = Ray::new([2.0, 2.0, 0.0], [0.0, 0.0, 1.0]);
-        let sample = Sample::trace(&mesh, &[hit, miss, hit], 1000);
+        let sample = Sample::trace(&mesh, &[hit, miss, hit], 1000, 1);
         assert_eq!(sample.len(), 3);
         assert_eq!(sample.wrong_hits(&[None; 3], true), 2);
         assert_eq!(sample.wrong_occlusions(&[true, true, false]), 2);
-        assert_eq!(Sample::trace(&mesh, &[hit, miss, hit], 2).len(), 2);
-        assert_eq!(Sample::trace(&mesh, &[], 1000).len(), 0);
+        assert_eq!(Sample::trace(&mesh, &[hit, miss, hit], 2, 1).len(), 2);
+        assert_eq!(Sample::trace(&mesh, &[hit, miss, hit], 0, 1).len(), 1);
+        assert_eq!(Sample::trace(&mesh, &[], 1000, 1).len(), 0);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use wide_bvh_scenes::{
     Mesh,
-    shapes::{cuboid, icosphere, plane, quantised, soup, terrain, torus_knot},
+    shapes::{crowd, cuboid, icosphere, plane, quantised, soup, terrain, torus_knot},
 };
 
 /// Closed and consistently wound: each edge is used once in each direction.
@@ -79,4 +79,37 @@ fn quantised_coordinates_are_whole_numbers() {
     // A mesh that is one point has no longest side to divide by.
     let point = quantised(cuboid([1.0; 3], [1.0; 3]), 8);
     assert!(point.positions.iter().flatten().all(|&x| x == 0.0));
+}
+
+#[test]
+fn a_crowd_is_whole_copies_in_their_cells() {
+    let one = cuboid([3.0; 3], [4.0, 5.0, 6.0]);
+    let many = crowd(&one, 12, 5);
+    assert_eq!(many.indices.len(), 12 * one.indices.len());
+    assert_eq!(many, crowd(&one, 12, 5));
+    assert_ne!(many, crowd(&one, 12, 6));
+    assert!(is_closed(&many));
+    assert!(volume(&many) > 0.0);
+    let corners: Vec<_> = many
+        .positions
+        .iter()
+        .map(|&p| glam::Vec3::from(p))
+        .collect();
+    let copies: Vec<_> = corners.chunks(one.positions.len()).collect();
+    assert_eq!(copies.len(), 12);
+    for (number, copy) in copies.iter().enumerate() {
+        let cell = [number % 3, number / 3 % 3, number / 9].map(|i| i as f32 + 0.5);
+        let centre = copy.iter().sum::<glam::Vec3>() / copy.len() as f32;
+        assert!((centre - glam::Vec3::from(cell)).abs().max_element() < 0.2001);
+        for corner in *copy {
+            let radius = corner.distance(centre);
+            assert!((0.3999..0.6001).contains(&radius), "{radius}");
+        }
+    }
+    // Turned, not merely moved: no edge of the first copy is along an axis.
+    let edge = copies[0][1] - copies[0][0];
+    assert!(edge.abs().max_element() < 0.999 * edge.length());
+    // A point has no size to scale to.
+    assert_eq!(crowd(&cuboid([1.0; 3], [1.0; 3]), 2, 1).indices.len(), 24);
+    assert!(crowd(&one, 0, 1).indices.is_empty());
 }

@@ -7,7 +7,7 @@
 //! Its triangle test culls back faces, so each triangle is asked for both ways round. Its rays have no
 //! range, so that is checked here; and no length, so distances are scaled back.
 
-use super::{Batch, Built, Engine, timed};
+use super::{Batch, Built, Chosen, Engine, timed};
 use bvh::{
     aabb::{Aabb, Bounded},
     bounding_hierarchy::BHShape,
@@ -17,8 +17,13 @@ use bvh::{
 use nalgebra::{Point3, Vector3};
 use wide_bvh::geometry::{Hit, Ray, TriangleMesh};
 
-/// Its tree, built without threads.
-pub fn engine(mesh: &TriangleMesh<'_>) -> Box<dyn Engine> {
+const NAME: &str = "bvh";
+
+/// Its tree, built without threads, if it is chosen.
+pub fn engine(mesh: &TriangleMesh<'_>, chosen: Chosen<'_>) -> Option<Box<dyn Engine>> {
+    if !chosen(NAME) {
+        return None;
+    }
     let ((tree, shapes), time) = timed(|| {
         let corners = |i: &[u32; 3]| i.map(|i| Point3::from(mesh.positions()[i as usize]));
         let mut shapes: Vec<Shape> = mesh
@@ -31,12 +36,12 @@ pub fn engine(mesh: &TriangleMesh<'_>) -> Box<dyn Engine> {
     });
     let bytes = size_of_val(&*tree.nodes) + size_of_val(&*shapes);
     let shallow = depth(&tree) <= ITERATOR_STACK;
-    Box::new(BvhCrate {
+    Some(Box::new(BvhCrate {
         built: Built { time, bytes },
         tree,
         shapes,
         shallow,
-    })
+    }))
 }
 
 /// How many nodes the unordered iterator can remember before it panics.
@@ -70,7 +75,7 @@ struct BvhCrate {
 
 impl Engine for BvhCrate {
     fn name(&self) -> &str {
-        "bvh"
+        NAME
     }
 
     fn built(&self) -> Built {

@@ -1,7 +1,8 @@
 //! The kernels that race, each behind the same two traits; a file each.
 //!
 //! What an engine may do untimed: build itself, and turn rays into its own format. Every engine is
-//! built by one thread, of the same buffers, and timed from those buffers to the first ray.
+//! built by one thread, of the same buffers, and timed from those buffers to the first ray; those that differ
+//! only in how they trace share a tree.
 
 mod bvh;
 mod embree;
@@ -25,6 +26,11 @@ pub trait Engine {
     /// Whether it promises the reference's answers bit for bit. Others may round differently.
     fn is_exact(&self) -> bool {
         false
+    }
+
+    /// How many rays it is handed at a time.
+    fn takes(&self) -> Takes {
+        Takes::OneRay
     }
 
     /// Turns rays into its own format.
@@ -53,16 +59,49 @@ pub struct Built {
     pub bytes: usize,
 }
 
-/// Every engine there is, over `mesh`; this crate's come first.
+/// How many rays a call of an engine takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// One.
+    OneRay,
+    /// Several, which it may trace together.
+    Batches,
+}
+
+/// Whether the engine of a name is wanted. What is not is not built.
+pub type Chosen<'a> = &'a dyn Fn(&str) -> bool;
+
+/// The chosen engines over `mesh`; this crate's come first.
 ///
 /// # Errors
 /// An engine cannot be built.
-pub fn all(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
-    let mut engines = wide_bvh::engines(mesh)?;
-    engines.extend(embree::engines(mesh)?);
-    engines.extend(obvhs::engines(mesh));
-    engines.push(bvh::engine(mesh));
+pub fn all(
+    mesh: &TriangleMesh<'_>,
+    chosen: Chosen<'_>,
+) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
+    let mut engines = wide_bvh::engines(mesh, chosen)?;
+    engines.extend(embree::engines(mesh, chosen)?);
+    engines.extend(obvhs::engines(mesh, chosen));
+    engines.extend(bvh::engine(mesh, chosen));
     Ok(engines)
+}
+
+/// A way to build a tree.
+pub struct Builder<'a> {
+    /// In tables and JSON.
+    pub name: &'static str,
+    /// Builds by so many threads, into what takes one ray a call.
+    pub build: Box<dyn Fn(usize) -> Outcome + 'a>,
+}
+
+/// What a builder makes, or why it cannot.
+pub type Outcome = Result<Box<dyn Engine>, Box<dyn Error>>;
+
+/// This crate's builders and Embree's, over `mesh`.
+pub fn builders<'a>(mesh: &'a TriangleMesh<'_>) -> Vec<Builder<'a>> {
+    let mut builders = wide_bvh::builders(mesh);
+    builders.extend(embree::builders(mesh));
+    builders
 }
 
 /// A line on Embree: its version, or how to get it.

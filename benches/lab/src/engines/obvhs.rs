@@ -2,7 +2,7 @@
 //! builder. As in its examples the triangles lie in the order of the leaves; they are its type with
 //! the edges and the normal worked out beforehand.
 
-use super::{Batch, Built, Engine, timed};
+use super::{Batch, Built, Chosen, Engine, timed};
 use glam::Vec3A;
 use obvhs::{
     BvhBuildParams,
@@ -15,9 +15,16 @@ use obvhs::{
 use std::time::Duration;
 use wide_bvh::geometry::{Hit, Ray, TriangleMesh};
 
-/// Both trees.
-pub fn engines(mesh: &TriangleMesh<'_>) -> [Box<dyn Engine>; 2] {
-    [engine::<CwBvh>(mesh), engine::<Bvh2>(mesh)]
+/// Those of both trees that are chosen.
+pub fn engines(mesh: &TriangleMesh<'_>, chosen: Chosen<'_>) -> Vec<Box<dyn Engine>> {
+    let mut engines = Vec::new();
+    if chosen(CwBvh::NAME) {
+        engines.push(engine::<CwBvh>(mesh));
+    }
+    if chosen(Bvh2::NAME) {
+        engines.push(engine::<Bvh2>(mesh));
+    }
+    engines
 }
 
 fn engine<T: Tree>(mesh: &TriangleMesh<'_>) -> Box<dyn Engine> {

@@ -1,59 +1,146 @@
 //! This crate: each width on each of the processor's backends. A width is built once; its backends
 //! trace the same tree in the same memory.
 
-use super::{Batch, Built, Engine, timed};
-use std::{cell::RefCell, error::Error, rc::Rc, time::Duration};
+use super::{Batch, Built, Chosen, Engine, Takes, timed};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use std::{cell::RefCell, error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
     build::Builder,
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Owned, TriangleLeaf, WideNode},
+    layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
     simd::Backend,
 };
 
-/// Both widths on every backend.
+/// Both widths on every backend, built by one thread.
 ///
 /// # Errors
 /// The mesh cannot be built on.
-pub fn engines(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
-    let (bvh8, time8) = timed(|| Builder::new().build(mesh));
-    let (bvh4, time4) = timed(|| Builder::new().build_as::<Node4>(mesh));
-    let mut engines = on_every_backend(bvh8?, time8);
-    engines.extend(on_every_backend(bvh4?, time4));
+pub fn engines(
+    mesh: &TriangleMesh<'_>,
+    chosen: Chosen<'_>,
+) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
+    let mut engines = of_width::<Node8>(mesh, chosen)?;
+    engines.extend(of_width::<Node4>(mesh, chosen)?);
     Ok(engines)
+}
+
+/// Every way to build, by name. All make trees of 8-wide nodes.
+fn recipes() -> Vec<(&'static str, Builder)> {
+    vec![("wide-bvh 8", Builder::new())]
+}
+
+/// Its builders.
+pub fn builders<'a>(mesh: &'a TriangleMesh<'_>) -> Vec<super::Builder<'a>> {
+    let builder = |(name, recipe): (&'static str, Builder)| super::Builder {
+        name,
+        build: Box::new(move |threads| {
+            let (tree, built) = build::<Node8>(&recipe, mesh, threads)?;
+            let backend = Backend::detect();
+            let name = name.to_owned();
+            Ok(WideBvh::<_, OneByOne>::boxed(name, built, tree, backend))
+        }),
+    };
+    recipes().into_iter().map(builder).collect()
 }
 
 type Triangles<N> = Bvh<N, TriangleLeaf, Owned>;
 
-fn on_every_backend<N: WideNode + 'static>(
-    bvh: Triangles<N>,
-    time: Duration,
-) -> Vec<Box<dyn Engine>> {
+/// A tree that engines share, each of which sets its backend before it traces.
+type Shared<N> = Rc<RefCell<Triangles<N>>>;
+
+fn of_width<N: WideNode + Send + 'static>(
+    mesh: &TriangleMesh<'_>,
+    chosen: Chosen<'_>,
+) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
+    let mut kinds: Vec<(String, Backend, Make<N>)> = Vec::new();
+    for backend in Backend::available() {
+        let name = format!("wide-bvh {} {}", N::WIDTH, backend.name());
+        kinds.push((name, backend, WideBvh::<N, OneByOne>::boxed));
+    }
+    kinds.retain(|(name, ..)| chosen(name));
+    if kinds.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (tree, built) = build(&Builder::new(), mesh, 1)?;
+    let engine = |(name, backend, make): (String, Backend, Make<N>)| {
+        make(name, built, Rc::clone(&tree), backend)
+    };
+    Ok(kinds.into_iter().map(engine).collect())
+}
+
+/// A tree built by so many threads.
+fn build<N: WideNode + Send>(
+    builder: &Builder,
+    mesh: &TriangleMesh<'_>,
+    threads: usize,
+) -> Result<(Shared<N>, Built), Box<dyn Error>> {
+    let pool = pool(threads)?;
+    let (tree, time) = pool.install(|| timed(|| builder.build_as(mesh)));
+    let tree: Triangles<N> = tree?;
     let built = Built {
         time,
-        bytes: bvh.bytes(),
+        bytes: tree.bytes(),
     };
-    let bvh = Rc::new(RefCell::new(bvh));
-    Backend::available()
-        .map(|backend| {
-            Box::new(WideBvh {
-                name: format!("wide-bvh {} {}", N::WIDTH, backend.name()),
-                built,
-                bvh: Rc::clone(&bvh),
-                backend,
-            }) as Box<dyn Engine>
-        })
-        .collect()
+    Ok((Rc::new(RefCell::new(tree)), built))
 }
 
-/// One width on one backend.
-struct WideBvh<N: WideNode> {
+fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
+    ThreadPoolBuilder::new().num_threads(threads).build()
+}
+
+/// How rays are handed over.
+trait Call {
+    const TAKES: Takes;
+
+    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]);
+
+    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]);
+}
+
+/// A ray a call.
+struct OneByOne;
+
+impl Call for OneByOne {
+    const TAKES: Takes = Takes::OneRay;
+
+    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = bvh.closest_hit(ray);
+        }
+    }
+
+    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]) {
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = bvh.any_hit(ray);
+        }
+    }
+}
+
+/// Makes an engine of the tree, with the name and the backend.
+type Make<N> = fn(String, Built, Shared<N>, Backend) -> Box<dyn Engine>;
+
+/// One width on one backend, called in one way.
+struct WideBvh<N: WideNode, C> {
     name: String,
     built: Built,
-    bvh: Rc<RefCell<Triangles<N>>>,
+    bvh: Shared<N>,
     backend: Backend,
+    call: PhantomData<C>,
 }
 
-impl<N: WideNode> Engine for WideBvh<N> {
+impl<N: WideNode + 'static, C: Call + 'static> WideBvh<N, C> {
+    fn boxed(name: String, built: Built, bvh: Shared<N>, backend: Backend) -> Box<dyn Engine> {
+        Box::new(Self {
+            name,
+            built,
+            bvh,
+            backend,
+            call: PhantomData,
+        })
+    }
+}
+
+impl<N: WideNode, C: Call> Engine for WideBvh<N, C> {
     fn name(&self) -> &str {
         &self.name
     }
@@ -66,17 +153,21 @@ impl<N: WideNode> Engine for WideBvh<N> {
         true
     }
 
+    fn takes(&self) -> Takes {
+        C::TAKES
+    }
+
     fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a> {
         Box::new(Rays { engine: self, rays })
     }
 }
 
-struct Rays<'a, N: WideNode> {
-    engine: &'a WideBvh<N>,
+struct Rays<'a, N: WideNode, C> {
+    engine: &'a WideBvh<N, C>,
     rays: &'a [Ray],
 }
 
-impl<N: WideNode> Rays<'_, N> {
+impl<N: WideNode, C> Rays<'_, N, C> {
     /// Runs `trace` with the hierarchy on this engine's backend.
     fn on_backend(&self, trace: impl FnOnce(&Triangles<N>)) {
         let mut bvh = self.engine.bvh.borrow_mut();
@@ -85,20 +176,12 @@ impl<N: WideNode> Rays<'_, N> {
     }
 }
 
-impl<N: WideNode> Batch for Rays<'_, N> {
+impl<N: WideNode, C: Call> Batch for Rays<'_, N, C> {
     fn closest(&self, hits: &mut [Option<Hit>]) {
-        self.on_backend(|bvh| {
-            for (ray, hit) in self.rays.iter().zip(hits) {
-                *hit = bvh.closest_hit(ray);
-            }
-        });
+        self.on_backend(|bvh| C::closest(bvh, self.rays, hits));
     }
 
     fn any(&self, occluded: &mut [bool]) {
-        self.on_backend(|bvh| {
-            for (ray, occluded) in self.rays.iter().zip(occluded) {
-                *occluded = bvh.any_hit(ray);
-            }
-        });
+        self.on_backend(|bvh| C::any(bvh, self.rays, occluded));
     }
 }

@@ -1,19 +1,26 @@
-//! `lab race`: every engine over the same rays, in one process, on one thread.
+//! `lab race`: every engine over the same rays, in one process, on one thread; and every builder over the
+//! same meshes.
 //!
 //! Figures move by tens of per cent from one minute to the next on a shared machine, so engines take
-//! turns: each round traces the workload once with every engine, each round begins with another, and
-//! the median of the rounds is the figure.
+//! turns: each round traces the workload once with every engine, in another order each time, and the
+//! median of the rounds is the figure. Orders are random, and the same in every run: an engine that always
+//! came after another over the same tree would always find that in the caches.
 
+mod builds;
+mod rays;
 mod record;
 mod table;
-mod workloads;
 
 use crate::{
+    effort::{self, Effort},
     engines::{self, Batch, Engine},
     reference::Sample,
+    scenes,
+    stats::median,
+    workloads::{Query, Workload, workloads},
 };
+use fastrand::Rng;
 use indicatif::{ProgressBar, ProgressStyle};
-use record::Record;
 use std::{
     error::Error,
     fs::File,
@@ -27,17 +34,23 @@ use wide_bvh::{
     geometry::{Hit, TriangleMesh},
 };
 use wide_bvh_scenes::Mesh;
-use workloads::{Query, Workload};
 
-/// Race this crate beside Embree, obvhs and bvh: single rays, one thread.
+/// Race this crate beside Embree, obvhs and bvh: tracing on one thread, building on one and two.
 ///
 /// Workloads: `primary`, camera rays in 8x8 tiles; `bounce`, cosine-weighted off each primary hit;
 /// `random`, from one point of the scene's bounds towards another, without end; `shadow`, any hit
 /// between each primary hit and a light. They are seeded, and the same for every engine.
 ///
-/// Engines take turns, round by round; the median of the rounds is the figure. All are built by one
-/// thread, too, from the vertex and index buffers to the first ray. Bytes a triangle are what an engine
-/// keeps besides those buffers.
+/// Engines take turns in random orders, round by round; the median of the rounds is the figure. All are
+/// built by one thread, too, from the vertex and index buffers to the first ray. Bytes a triangle are what
+/// an engine keeps besides those buffers.
+///
+/// Embree's calls: `embree HIGH`, single rays; `8` and `16`, packets; `1M`, streams (Embree 3 has them,
+/// Embree 4 none); `coherent`, with the flag that says so. They share one tree. Rays are in an engine's own
+/// format beforehand, in the order of the workload; copying what a call overwrites is timed.
+///
+/// Builders take turns likewise. Their trees are compared by how fast bounce rays are traced, one a call, by
+/// one thread.
 ///
 /// Answers are compared to brute force on a sample of the rays. Engines of this crate disagree if one
 /// bit of t, u, v or the triangle's number differs. Others disagree if they hit where brute force
@@ -48,47 +61,40 @@ use workloads::{Query, Workload};
 /// (Debian and Ubuntu: apt-get install libembree-dev).
 #[derive(clap::Args)]
 pub struct Args {
-    /// Also write every figure to this file, as a JSON list
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Meshes to race over (PLY, OBJ, binary glTF); without any, a scene made by code
-    #[arg(long, value_name = "FILE", num_args = 1..)]
-    scenes: Vec<PathBuf>,
-    /// Race only the engines whose names contain one of these
+    #[command(flatten)]
+    scenes: scenes::Args,
+    /// Race only the engines and builders whose names contain one of these
     #[arg(long, value_name = "TEXT", num_args = 1..)]
     engines: Vec<String>,
-    /// Few rays and rounds: minutes become seconds, and the figures rough
-    #[arg(long)]
-    quick: bool,
+    /// Race one of the two alone
+    #[arg(long, value_name = "PART")]
+    only: Option<Part>,
+    #[command(flatten)]
+    effort: effort::Args,
+    /// Also write every figure to this file, as a JSON list. Builders' have the workload `build 1 thread` or
+    /// `build 2 threads`, and rays a second, sample and disagreements of bounce rays through their trees
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// What is raced.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Tracing
+    Rays,
+    /// Building
+    Builds,
 }
 
 impl Args {
-    /// Whether the engine of this name races.
+    /// Whether the engine or builder of this name races.
     fn chosen(&self, name: &str) -> bool {
         self.engines.is_empty() || self.engines.iter().any(|text| name.contains(text.as_str()))
     }
-}
 
-/// How much to measure.
-struct Effort {
-    /// Rays of a workload.
-    rays: usize,
-    rounds: usize,
-    /// Triangle tests by brute force for a workload's sample: about a nanosecond each.
-    tests: usize,
-}
-
-impl Effort {
-    const FULL: Self = Self {
-        rays: 1 << 18,
-        rounds: 9,
-        tests: 200_000_000,
-    };
-    const QUICK: Self = Self {
-        rays: 1 << 14,
-        rounds: 7,
-        tests: 20_000_000,
-    };
+    fn races(&self, part: Part) -> bool {
+        self.only.is_none_or(|only| only == part)
+    }
 }
 
 /// Runs the race and prints its tables.
@@ -96,81 +102,84 @@ impl Effort {
 /// # Errors
 /// A scene that cannot be read, an engine that cannot be built, a JSON file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let scenes = if args.scenes.is_empty() {
-        vec![wide_bvh_scenes::default_scene()]
-    } else {
-        let load = |path: &PathBuf| wide_bvh_scenes::load(path);
-        args.scenes.iter().map(load).collect::<Result<_, _>>()?
-    };
+    let scenes = args.scenes.load()?;
     // Now, so that no minutes are spent on figures that cannot be written.
     let create =
         |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
     let json = args.json.as_ref().map(create).transpose()?;
-    let effort = if args.quick {
-        Effort::QUICK
-    } else {
-        Effort::FULL
-    };
+    let effort = args.effort.effort();
+    let chosen = |name: &str| args.chosen(name);
 
-    let mut records = Vec::new();
+    let (mut traced, mut built) = (Vec::new(), Vec::new());
     let mut out = io::stdout();
     writeln!(out, "{}", engines::about_embree()?)?;
     for scene in &scenes {
-        let mut engines = engines::all(&TriangleMesh::new(&scene.positions, &scene.indices)?)?;
-        engines.retain(|engine| args.chosen(engine.name()));
-        let results = race(scene, &engines, &effort)?;
-        write!(out, "\n{}", table::of_scene(&results))?;
-        records.extend(results);
+        let course = Course::new(scene, &effort)?;
+        if args.races(Part::Rays) {
+            let results = rays::race(&course, &engines::all(&course.mesh, &chosen)?, &effort)?;
+            write!(out, "\n{}", table::rays::of_scene(&results))?;
+            traced.extend(results);
+        }
+        if args.races(Part::Builds) {
+            let mut builders = engines::builders(&course.mesh);
+            builders.retain(|builder| chosen(builder.name));
+            let results = builds::race(&course, &builders, &effort)?;
+            write!(out, "\n{}", table::builds::of_scene(&results))?;
+            built.extend(results);
+        }
     }
-    writeln!(out, "{}", table::means(&records))?;
+    write!(out, "{}", table::rays::means(&traced))?;
+    write!(out, "{}", table::builds::means(&built))?;
     writeln!(out, "{}", table::legend())?;
     if let Some(file) = json {
-        serde_json::to_writer_pretty(file, &records)?;
+        traced.extend(built);
+        serde_json::to_writer_pretty(file, &traced)?;
     }
     Ok(())
 }
 
-/// One scene: a record of each engine on each workload that has rays.
-fn race(
-    scene: &Mesh,
-    engines: &[Box<dyn Engine>],
-    effort: &Effort,
-) -> Result<Vec<Record>, Box<dyn Error>> {
-    let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
-    let workloads = workloads::workloads(scene, &Builder::new().build(&mesh)?, effort.rays);
-    let turns = workloads.len() * engines.len() * (effort.rounds + 1);
-    let progress = ProgressBar::new(turns as u64)
-        .with_style(ProgressStyle::with_template("{msg} {wide_bar} {percent}%")?);
-    let mut records = Vec::new();
-    for workload in &workloads {
-        progress.set_message(format!("{} {}", scene.name, workload.name));
-        if workload.rays.is_empty() {
-            continue;
-        }
-        let sample = Sample::trace(&mesh, &workload.rays, effort.tests);
-        for (engine, score) in engines.iter().zip(measure(
+/// A scene, and the rays that are raced through it.
+struct Course<'a> {
+    name: &'a str,
+    mesh: TriangleMesh<'a>,
+    /// Those that have rays.
+    trials: Vec<Trial>,
+}
+
+/// Rays, and what some of them hit.
+struct Trial {
+    workload: Workload,
+    sample: Sample,
+}
+
+impl<'a> Course<'a> {
+    fn new(scene: &'a Mesh, effort: &Effort) -> Result<Self, Box<dyn Error>> {
+        let mesh = TriangleMesh::new(&scene.positions, &scene.indices)?;
+        let mut workloads = Vec::from(workloads(scene, &Builder::new().build(&mesh)?, effort.rays));
+        workloads.retain(|workload| !workload.rays.is_empty());
+        let trial = |workload: Workload| Trial {
+            sample: Sample::trace(&mesh, &workload.rays, effort.tests, effort.least_sample),
             workload,
-            engines,
-            &sample,
-            effort.rounds,
-            &progress,
-        )) {
-            let built = engine.built();
-            records.push(Record {
-                scene: scene.name.clone(),
-                triangles: mesh.len(),
-                workload: workload.name,
-                engine: engine.name().to_owned(),
-                mrays_per_s: score.mrays_per_s,
-                build_ms: built.time.as_secs_f64() * 1e3,
-                bytes_per_triangle: built.bytes as f64 / mesh.len() as f64,
-                sample: sample.len(),
-                disagreements: score.disagreements,
-            });
-        }
+        };
+        Ok(Self {
+            name: &scene.name,
+            trials: workloads.into_iter().map(trial).collect(),
+            mesh,
+        })
     }
-    progress.finish_and_clear();
-    Ok(records)
+}
+
+/// How far along a race of so many steps is.
+fn progress(steps: usize) -> Result<ProgressBar, Box<dyn Error>> {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}%")?;
+    Ok(ProgressBar::new(steps as u64).with_style(style))
+}
+
+/// The turns of one round: every number below `count`, in random order.
+fn turns(count: usize, rng: &mut Rng) -> Vec<usize> {
+    let mut turns: Vec<usize> = (0..count).collect();
+    rng.shuffle(&mut turns);
+    turns
 }
 
 /// How an engine did on a workload.
@@ -179,11 +188,10 @@ struct Score {
     disagreements: usize,
 }
 
-/// One workload, by every engine.
+/// One workload, by every engine; `rounds + 1` steps for each.
 fn measure(
-    workload: &Workload,
+    Trial { workload, sample }: &Trial,
     engines: &[Box<dyn Engine>],
-    sample: &Sample,
     rounds: usize,
     progress: &ProgressBar,
 ) -> Vec<Score> {
@@ -203,9 +211,9 @@ fn measure(
         })
         .collect();
     let mut seconds = vec![Vec::with_capacity(rounds); engines.len()];
-    for round in 0..rounds {
-        for turn in 0..engines.len() {
-            let engine = (round + turn) % engines.len();
+    let mut rng = Rng::with_seed(1);
+    for _ in 0..rounds {
+        for engine in turns(engines.len(), &mut rng) {
             let start = Instant::now();
             answers.trace(&*batches[engine], workload.query);
             seconds[engine].push(start.elapsed().as_secs_f64());
@@ -251,45 +259,69 @@ impl Answers {
     }
 }
 
-/// The middle value; the mean of the middle two.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 {
-        values[middle]
-    } else {
-        (values[middle - 1] + values[middle]) / 2.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{engines::Takes, workloads};
+    use std::time::Duration;
+
+    const EFFORT: Effort = Effort {
+        rays: 400,
+        rounds: 2,
+        tests: 100_000,
+        least_sample: 1,
+        builds: Duration::ZERO,
+    };
 
     #[test]
     fn every_engine_finishes_and_this_crate_agrees() {
         let scene = wide_bvh_scenes::shapes::cuboid([-1.0; 3], [1.0; 3]);
-        let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
-        let engines = engines::all(&mesh).unwrap();
-        let effort = Effort {
-            rays: 400,
-            rounds: 2,
-            tests: 100_000,
-        };
-        let records = race(&scene, &engines, &effort).unwrap();
-        assert_eq!(records.len(), 4 * engines.len());
+        let course = Course::new(&scene, &EFFORT).unwrap();
+        let engines = engines::all(&course.mesh, &|_| true).unwrap();
+        let records = rays::race(&course, &engines, &EFFORT).unwrap();
+        assert_eq!(records.len(), workloads::NAMES.len() * engines.len());
         for record in records {
             assert!(record.mrays_per_s > 0.0 && record.bytes_per_triangle > 0.0);
             assert!(record.sample > 50);
-            if record.engine.starts_with("wide-bvh ") {
+            // Batches of Embree's end with packets that are not full.
+            if record.engine.starts_with("wide-bvh ") || record.takes == Takes::Batches {
                 assert_eq!(record.disagreements, 0, "{record:?}");
             }
         }
     }
 
     #[test]
-    fn the_median_is_the_middle() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(vec![4.0, 1.0, 3.0, 2.0]), 2.5);
+    fn every_builder_finishes_and_its_tree_agrees() {
+        let scene = wide_bvh_scenes::shapes::torus_knot(2, 3, 0.2, 100, 12);
+        let course = Course::new(&scene, &EFFORT).unwrap();
+        let builders = engines::builders(&course.mesh);
+        let records = builds::race(&course, &builders, &EFFORT).unwrap();
+        assert_eq!(records.len(), 2 * builders.len());
+        for record in records {
+            assert!(record.build_ms > 0.0 && record.mrays_per_s > 0.0);
+            assert!(record.sample > 10);
+            assert_eq!(record.disagreements, 0, "{record:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_chosen_is_not_there() {
+        let scene = wide_bvh_scenes::shapes::cuboid([-1.0; 3], [1.0; 3]);
+        let mesh = TriangleMesh::new(&scene.positions, &scene.indices).unwrap();
+        let engines = engines::all(&mesh, &|name| name == "obvhs bvh2").unwrap();
+        let names: Vec<&str> = engines.iter().map(|engine| engine.name()).collect();
+        assert_eq!(names, ["obvhs bvh2"]);
+    }
+
+    #[test]
+    fn every_engine_has_a_turn_each_round_and_orders_differ() {
+        let mut rng = Rng::with_seed(1);
+        let rounds: Vec<_> = (0..9).map(|_| turns(5, &mut rng)).collect();
+        for round in &rounds {
+            let mut sorted = round.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2, 3, 4]);
+        }
+        assert!(rounds.iter().any(|round| *round != rounds[0]));
     }
 }

@@ -1,5 +1,6 @@
 //! Meshes made by code, the same every time: for tests that need to know their input, and for scenes.
 
+mod crowd;
 mod patch;
 mod polyhedra;
 mod quantised;
@@ -8,6 +9,7 @@ mod soup;
 mod terrain;
 mod torus_knot;
 
+pub use crowd::crowd;
 pub use patch::{Wrap, patch};
 pub use polyhedra::{cuboid, icosphere};
 pub use quantised::quantised;

@@ -2,11 +2,19 @@
 //! functions, looked up when running. Nothing here is safe to use wrongly; `super` uses it rightly.
 
 use libloading::Library;
-use std::ffi::{c_char, c_int, c_uint, c_void};
+use std::{
+    ffi::{c_char, c_int, c_uint, c_void},
+    ptr::null,
+};
+use wide_bvh::geometry;
 
 /// An opaque handle. Each kind of handle is a pointer of its own in C.
 pub type Handle = *mut c_void;
 
+/// `RTC_BUILD_QUALITY_LOW`: a tree in Morton order.
+pub const BUILD_QUALITY_LOW: c_int = 0;
+/// `RTC_BUILD_QUALITY_MEDIUM`: a binned SAH tree.
+pub const BUILD_QUALITY_MEDIUM: c_int = 1;
 /// `RTC_BUILD_QUALITY_HIGH`: a binned SAH tree with spatial splits.
 pub const BUILD_QUALITY_HIGH: c_int = 2;
 /// `RTC_SCENE_FLAG_NONE`.
@@ -31,6 +39,8 @@ pub const ERROR_NONE: c_int = 0;
 pub const PROPERTY_VERSION: [c_int; 3] = [1, 2, 3];
 /// `RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED`, then 16.
 pub const PROPERTY_NATIVE_RAY: [c_int; 2] = [33, 34];
+/// `RTC_DEVICE_PROPERTY_RAY_STREAM_SUPPORTED`.
+pub const PROPERTY_RAY_STREAM: c_int = 35;
 
 /// `RTCRay`.
 #[derive(Clone, Copy)]
@@ -45,6 +55,26 @@ pub struct Ray {
     pub mask: c_uint,
     pub id: c_uint,
     pub flags: c_uint,
+}
+
+impl Ray {
+    pub fn new(ray: &geometry::Ray) -> Self {
+        Self {
+            origin: ray.origin.to_array(),
+            t_near: ray.t_min,
+            direction: ray.direction.to_array(),
+            time: 0.0,
+            t_far: ray.t_max,
+            mask: !0,
+            id: 0,
+            flags: 0,
+        }
+    }
+
+    /// Whether `rtcOccluded1` found something.
+    pub fn is_occluded(&self) -> bool {
+        self.t_far < 0.0
+    }
 }
 
 /// `RTCHit` of one level of instances. Later versions of Embree 4 have one more number at the end,
@@ -82,6 +112,46 @@ pub struct RayHit {
     pub hit: Hit,
 }
 
+impl RayHit {
+    /// What `rtcIntersect1` found.
+    pub fn found(&self) -> Option<geometry::Hit> {
+        (self.hit.geometry != INVALID_GEOMETRY_ID).then_some(geometry::Hit {
+            t: self.ray.t_far,
+            u: self.hit.u,
+            v: self.hit.v,
+            primitive: self.hit.primitive,
+        })
+    }
+}
+
+/// `RTCRay8` or `RTCRay16`.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub struct RayPacket<const N: usize> {
+    pub origin: [[f32; N]; 3],
+    pub t_near: [f32; N],
+    pub direction: [[f32; N]; 3],
+    pub time: [f32; N],
+    /// As a single ray's.
+    pub t_far: [f32; N],
+    pub mask: [c_uint; N],
+    pub id: [c_uint; N],
+    pub flags: [c_uint; N],
+}
+
+/// `RTCRayHit8` or `RTCRayHit16`. The last part is not there in all versions.
+#[repr(C, align(64))]
+pub struct RayHitPacket<const N: usize> {
+    pub ray: RayPacket<N>,
+    pub normal: [[f32; N]; 3],
+    pub u: [f32; N],
+    pub v: [f32; N],
+    pub primitive: [c_uint; N],
+    pub geometry: [c_uint; N],
+    pub instance: [c_uint; N],
+    pub instance_primitive: [c_uint; N],
+}
+
 /// `RTCIntersectContext` of Embree 3 with one level of instances, as it is built by default.
 #[repr(C)]
 pub struct Context3 {
@@ -93,31 +163,100 @@ pub struct Context3 {
 }
 
 impl Context3 {
-    /// What `rtcInitIntersectContext` makes: incoherent rays, no filter.
-    pub const INCOHERENT: Self = Self {
-        flags: 0,
-        filter: std::ptr::null(),
-        instance: INVALID_GEOMETRY_ID,
-        min_width_distance_factor: 0.0,
-    };
+    /// What `rtcInitIntersectContext` makes, for rays that are coherent or not: no filter.
+    pub fn new(coherent: bool) -> Self {
+        Self {
+            flags: c_int::from(coherent),
+            filter: null(),
+            instance: INVALID_GEOMETRY_ID,
+            min_width_distance_factor: 0.0,
+        }
+    }
+}
+
+/// `RTCIntersectArguments` and `RTCOccludedArguments` of Embree 4, which are laid out alike.
+#[repr(C)]
+pub struct Arguments4 {
+    flags: c_int,
+    features: c_uint,
+    context: *const c_void,
+    filter: *const c_void,
+    callback: *const c_void,
+    /// There only where Embree is built with `EMBREE_MIN_WIDTH`.
+    min_width_distance_factor: f32,
+}
+
+impl Arguments4 {
+    /// What `rtcInitIntersectArguments` makes, for rays that are coherent or not: all features, no
+    /// callbacks.
+    pub fn new(coherent: bool) -> Self {
+        Self {
+            flags: c_int::from(coherent) << 16,
+            features: c_uint::MAX,
+            context: null(),
+            filter: null(),
+            callback: null(),
+            min_width_distance_factor: 0.0,
+        }
+    }
 }
 
 /// `RTCMemoryMonitorFunction`.
 pub type MemoryMonitor = unsafe extern "C" fn(user: *mut c_void, bytes: isize, post: bool) -> bool;
 
-/// The two queries, whose parameters differ from one version to the next.
+/// The calls for one ray, whose parameters differ from one version to the next.
 #[derive(Clone, Copy)]
-pub enum Queries {
+pub enum SingleCalls {
     /// Embree 3: scene, context, ray.
     V3 {
-        intersect1: unsafe extern "C" fn(Handle, *mut Context3, *mut RayHit),
-        occluded1: unsafe extern "C" fn(Handle, *mut Context3, *mut Ray),
+        intersect: unsafe extern "C" fn(Handle, *mut Context3, *mut RayHit),
+        occluded: unsafe extern "C" fn(Handle, *mut Context3, *mut Ray),
     },
     /// Embree 4: scene, ray, arguments; those may be null.
     V4 {
-        intersect1: unsafe extern "C" fn(Handle, *mut RayHit, *mut c_void),
-        occluded1: unsafe extern "C" fn(Handle, *mut Ray, *mut c_void),
+        intersect: unsafe extern "C" fn(Handle, *mut RayHit, *mut Arguments4),
+        occluded: unsafe extern "C" fn(Handle, *mut Ray, *mut Arguments4),
     },
+}
+
+/// The calls for a packet of `N` rays. First comes -1 for every lane that is to be traced, 0 for others.
+#[derive(Clone, Copy)]
+pub enum PacketCalls<const N: usize> {
+    /// Embree 3: lanes, scene, context, rays.
+    V3 {
+        intersect: unsafe extern "C" fn(*const c_int, Handle, *mut Context3, *mut RayHitPacket<N>),
+        occluded: unsafe extern "C" fn(*const c_int, Handle, *mut Context3, *mut RayPacket<N>),
+    },
+    /// Embree 4: lanes, scene, rays, arguments; those may be null.
+    V4 {
+        intersect:
+            unsafe extern "C" fn(*const c_int, Handle, *mut RayHitPacket<N>, *mut Arguments4),
+        occluded: unsafe extern "C" fn(*const c_int, Handle, *mut RayPacket<N>, *mut Arguments4),
+    },
+}
+
+/// The calls for an array of rays: scene, context, rays, how many, and the bytes from one to the next.
+#[derive(Clone, Copy)]
+pub struct StreamCalls {
+    pub intersect: unsafe extern "C" fn(Handle, *mut Context3, *mut RayHit, c_uint, usize),
+    pub occluded: unsafe extern "C" fn(Handle, *mut Context3, *mut Ray, c_uint, usize),
+}
+
+/// Looks up the two calls of one kind, for the version of Embree.
+macro_rules! calls {
+    ($library:ident, $major:ident, $calls:ident, $intersect:literal, $occluded:literal) => {
+        if $major >= 4 {
+            $calls::V4 {
+                intersect: *$library.get($intersect)?,
+                occluded: *$library.get($occluded)?,
+            }
+        } else {
+            $calls::V3 {
+                intersect: *$library.get($intersect)?,
+                occluded: *$library.get($occluded)?,
+            }
+        }
+    };
 }
 
 macro_rules! functions {
@@ -125,7 +264,11 @@ macro_rules! functions {
         /// The library and its functions, named as in C but for the prefix.
         pub struct Api {
             $(pub $field: unsafe extern "C" fn($($parameter),*) $(-> $result)?,)*
-            pub queries: Queries,
+            pub single: SingleCalls,
+            pub packet8: PacketCalls<8>,
+            pub packet16: PacketCalls<16>,
+            /// Embree 4 has none.
+            pub stream: Option<StreamCalls>,
             /// Keeps the code that the pointers above lead to.
             _library: Library,
         }
@@ -140,20 +283,21 @@ macro_rules! functions {
                 // declare each function with the parameters and the result given here; the pointers
                 // live in one struct with the library.
                 unsafe {
-                    let queries = if major >= 4 {
-                        Queries::V4 {
-                            intersect1: *library.get("rtcIntersect1")?,
-                            occluded1: *library.get("rtcOccluded1")?,
-                        }
+                    let stream = if major >= 4 {
+                        None
                     } else {
-                        Queries::V3 {
-                            intersect1: *library.get("rtcIntersect1")?,
-                            occluded1: *library.get("rtcOccluded1")?,
-                        }
+                        Some(StreamCalls {
+                            intersect: *library.get("rtcIntersect1M")?,
+                            occluded: *library.get("rtcOccluded1M")?,
+                        })
                     };
                     Ok(Self {
                         $($field: *library.get($symbol)?,)*
-                        queries,
+                        single: calls!(library, major, SingleCalls, "rtcIntersect1", "rtcOccluded1"),
+                        packet8: calls!(library, major, PacketCalls, "rtcIntersect8", "rtcOccluded8"),
+                        packet16:
+                            calls!(library, major, PacketCalls, "rtcIntersect16", "rtcOccluded16"),
+                        stream,
                         _library: library,
                     })
                 }

@@ -1,26 +1,25 @@
-//! Embree, opened when running: single-ray calls over its tree of HIGH quality, in its ordinary mode
-//! and in its robust one, built and traced by one thread (`threads=1`).
+//! Embree, opened when running: its trees, and the calls that trace them.
 //!
-//! Rays are Embree's own struct beforehand; tracing copies each onto the stack, as the call overwrites
-//! it. Making a device is not timed: that readies the library. Bytes are what its memory monitor
-//! counts. The vertex and index buffers are shared, so they are not in it.
+//! Rays are in Embree's own format beforehand; copying what a call overwrites is timed. Making a device is not:
+//! that readies the library. Bytes are what its memory monitor counts. The vertex and index buffers are
+//! shared, so they are not in it.
 
+mod device;
 mod ffi;
+mod packet;
+mod scene;
+mod single;
+mod stream;
 
-use super::{Batch, Built, Engine, timed};
-use ffi::{Api, Context3, Handle, Queries, RayHit};
+use super::{Batch, Builder, Built, Chosen, Engine, Takes};
+use device::Device;
+use ffi::{Api, StreamCalls};
 use libloading::Library;
-use std::{
-    error::Error,
-    ffi::{CStr, c_int, c_void},
-    fmt,
-    ptr::null_mut,
-    sync::{
-        LazyLock,
-        atomic::{AtomicIsize, Ordering},
-    },
-};
-use wide_bvh::geometry::{Hit, Ray, TriangleMesh};
+use packet::Packets;
+use scene::{Buffers, Recipe, Scene};
+use std::{error::Error, ffi::c_int, fmt, rc::Rc, sync::LazyLock};
+use stream::Stream;
+use wide_bvh::geometry::{Ray, TriangleMesh};
 
 /// The newest Embree of version 4 or 3 where the system looks for libraries. It is never closed: the
 /// threads that its scheduler keeps would lose their code.
@@ -46,7 +45,7 @@ static API: LazyLock<Option<Api>> = LazyLock::new(|| {
 /// Embree cannot make a device.
 pub fn about() -> Result<String, EmbreeError> {
     match &*API {
-        Some(api) => Ok(Device::new(api, c"threads=1")?.describe()),
+        Some(api) => Ok(Recipe::HIGH.device(api)?.describe()),
         None => Ok(HOW_TO_INSTALL.to_owned()),
     }
 }
@@ -54,36 +53,94 @@ pub fn about() -> Result<String, EmbreeError> {
 const HOW_TO_INSTALL: &str = "Embree is not installed, so the race goes on without it: it takes \
     libembree4 or libembree3 (Debian and Ubuntu: apt-get install libembree-dev)";
 
-/// Its modes: ordinary and robust, and where it would use AVX-512 the ordinary one on AVX2 as well. None without
-/// Embree.
+/// Trees of one thread. HIGH has all calls, the others single rays alone: in the robust mode, on AVX2 where
+/// the ordinary one would use AVX-512, and of MEDIUM quality. None without Embree.
 ///
 /// # Errors
 /// Embree cannot make a device or a scene.
-pub fn engines(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, EmbreeError> {
+pub fn engines(
+    mesh: &TriangleMesh<'_>,
+    chosen: Chosen<'_>,
+) -> Result<Vec<Box<dyn Engine>>, EmbreeError> {
     let Some(api) = &*API else {
         return Ok(Vec::new());
     };
-    let mut modes = vec![
-        ("embree HIGH", c"threads=1", ffi::SCENE_FLAG_NONE),
-        ("embree HIGH robust", c"threads=1", ffi::SCENE_FLAG_ROBUST),
+    let high = Recipe::HIGH;
+    let robust = Recipe {
+        flags: ffi::SCENE_FLAG_ROBUST,
+        ..high
+    };
+    let medium = Recipe {
+        quality: ffi::BUILD_QUALITY_MEDIUM,
+        ..high
+    };
+    let avx2 = Recipe { avx2: true, ..high };
+    let device = high.device(api)?;
+    let single = vec![Call::Single];
+    let mut trees = vec![
+        ("embree HIGH", high, Call::all(&device)),
+        ("embree HIGH robust", robust, single.clone()),
+        ("embree MEDIUM", medium, single.clone()),
     ];
-    if Device::new(api, c"threads=1")?.has_avx512() {
-        let config = c"threads=1,isa=avx2";
-        modes.push(("embree HIGH avx2", config, ffi::SCENE_FLAG_NONE));
+    if device.has_avx512() {
+        trees.push(("embree HIGH avx2", avx2, single));
     }
-    modes
-        .into_iter()
-        .map(|(name, config, flags)| {
-            let device = Device::new(api, config)?;
-            let (scene, time) = timed(|| Scene::new(device, mesh, flags));
-            let scene = scene?;
-            let built = Built {
-                time,
-                bytes: scene.device.bytes(),
+    let buffers = Buffers::new(mesh);
+    let mut engines = Vec::new();
+    for (tree, recipe, calls) in trees {
+        let named = |call: Call| (format!("{tree}{}", call.suffix()), call);
+        let mut calls: Vec<_> = calls.into_iter().map(named).collect();
+        calls.retain(|(name, _)| chosen(name));
+        if calls.is_empty() {
+            continue;
+        }
+        let (scene, built) = Scene::build(api, &buffers, recipe)?;
+        let scene = Rc::new(scene);
+        engines.extend(calls.into_iter().map(|(name, call)| {
+            Box::new(Embree {
+                name,
+                built,
+                scene: Rc::clone(&scene),
+                call,
+            }) as Box<dyn Engine>
+        }));
+    }
+    Ok(engines)
+}
+
+/// Its builders. None without Embree.
+pub fn builders<'a>(mesh: &TriangleMesh<'_>) -> Vec<Builder<'a>> {
+    let Some(api) = &*API else {
+        return Vec::new();
+    };
+    let buffers = Buffers::new(mesh);
+    [
+        ("embree LOW", ffi::BUILD_QUALITY_LOW),
+        ("embree MEDIUM", ffi::BUILD_QUALITY_MEDIUM),
+        ("embree HIGH", ffi::BUILD_QUALITY_HIGH),
+    ]
+    .map(|(name, quality)| {
+        let buffers = Rc::clone(&buffers);
+        let build = move |threads| {
+            let recipe = Recipe {
+                threads,
+                quality,
+                ..Recipe::HIGH
             };
-            Ok(Box::new(Embree { name, built, scene }) as Box<dyn Engine>)
-        })
-        .collect()
+            let (scene, built) = Scene::build(api, &buffers, recipe)?;
+            Ok(Box::new(Embree {
+                name: name.to_owned(),
+                built,
+                scene: Rc::new(scene),
+                call: Call::Single,
+            }) as Box<dyn Engine>)
+        };
+        Builder {
+            name,
+            build: Box::new(build),
+        }
+    })
+    .into()
 }
 
 /// What Embree said went wrong: an `RTCError`.
@@ -98,248 +155,87 @@ impl fmt::Display for EmbreeError {
 
 impl Error for EmbreeError {}
 
-/// One mode.
+/// How rays are handed over.
+#[derive(Clone, Copy)]
+enum Call {
+    /// `rtcIntersect1`, `rtcOccluded1`.
+    Single,
+    /// `rtcIntersect8`, `rtcOccluded8`.
+    Packet8 { coherent: bool },
+    /// `rtcIntersect16`, `rtcOccluded16`.
+    Packet16 { coherent: bool },
+    /// `rtcIntersect1M`, `rtcOccluded1M`.
+    Stream { calls: StreamCalls, coherent: bool },
+}
+
+impl Call {
+    /// What the device has; packets of 16 only where vectors are as wide.
+    fn all(device: &Device) -> Vec<Self> {
+        let mut calls = vec![Self::Single];
+        for coherent in [true, false] {
+            calls.push(Self::Packet8 { coherent });
+            if device.has_avx512() {
+                calls.push(Self::Packet16 { coherent });
+            }
+            let stream = device
+                .stream()
+                .map(|calls| Self::Stream { calls, coherent });
+            calls.extend(stream);
+        }
+        calls
+    }
+
+    /// What it adds to the tree's name.
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Single => "",
+            Self::Packet8 { coherent: true } => " 8 coherent",
+            Self::Packet8 { coherent: false } => " 8",
+            Self::Packet16 { coherent: true } => " 16 coherent",
+            Self::Packet16 { coherent: false } => " 16",
+            Self::Stream { coherent: true, .. } => " 1M coherent",
+            Self::Stream {
+                coherent: false, ..
+            } => " 1M",
+        }
+    }
+}
+
+/// A tree and a call.
 struct Embree {
-    name: &'static str,
+    name: String,
     built: Built,
-    scene: Scene,
+    scene: Rc<Scene>,
+    call: Call,
 }
 
 impl Engine for Embree {
     fn name(&self) -> &str {
-        self.name
+        &self.name
     }
 
     fn built(&self) -> Built {
         self.built
     }
 
+    fn takes(&self) -> Takes {
+        match self.call {
+            Call::Single => Takes::OneRay,
+            _ => Takes::Batches,
+        }
+    }
+
     fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a> {
-        let rays = rays
-            .iter()
-            .map(|ray| ffi::Ray {
-                origin: ray.origin.to_array(),
-                t_near: ray.t_min,
-                direction: ray.direction.to_array(),
-                time: 0.0,
-                t_far: ray.t_max,
-                mask: !0,
-                id: 0,
-                flags: 0,
-            })
-            .collect();
-        Box::new(Rays {
-            scene: &self.scene,
-            rays,
-        })
-    }
-}
-
-struct Rays<'a> {
-    scene: &'a Scene,
-    rays: Vec<ffi::Ray>,
-}
-
-impl Rays<'_> {
-    fn intersect_all(&self, hits: &mut [Option<Hit>], intersect1: impl Fn(&mut RayHit)) {
-        for (&ray, hit) in self.rays.iter().zip(hits) {
-            let mut found = RayHit {
-                ray,
-                hit: ffi::Hit::NONE,
-            };
-            intersect1(&mut found);
-            *hit = (found.hit.geometry != ffi::INVALID_GEOMETRY_ID).then_some(Hit {
-                t: found.ray.t_far,
-                u: found.hit.u,
-                v: found.hit.v,
-                primitive: found.hit.primitive,
-            });
-        }
-    }
-
-    fn occlude_all(&self, occluded: &mut [bool], occluded1: impl Fn(&mut ffi::Ray)) {
-        for (&(mut ray), occluded) in self.rays.iter().zip(occluded) {
-            occluded1(&mut ray);
-            *occluded = ray.t_far < 0.0;
-        }
-    }
-}
-
-impl Batch for Rays<'_> {
-    fn closest(&self, hits: &mut [Option<Hit>]) {
-        let scene = self.scene.handle;
-        match self.scene.device.api.queries {
-            Queries::V3 { intersect1, .. } => {
-                let mut context = Context3::INCOHERENT;
-                let context = &raw mut context;
-                self.intersect_all(hits, |ray| {
-                    // SAFETY: the scene is committed; the context and the ray are as they should
-                    // be, and live until the call returns.
-                    unsafe { intersect1(scene, context, ray) }
-                });
+        let (scene, api) = (&*self.scene, self.scene.api());
+        match self.call {
+            Call::Single => Box::new(single::Rays::new(scene, rays)),
+            Call::Packet8 { coherent } => {
+                Box::new(Packets::new(scene, api.packet8, coherent, rays))
             }
-            Queries::V4 { intersect1, .. } => self.intersect_all(hits, |ray| {
-                // SAFETY: the scene is committed, the ray lives until the call returns, and no
-                // arguments are the default ones.
-                unsafe { intersect1(scene, ray, null_mut()) }
-            }),
-        }
-    }
-
-    fn any(&self, occluded: &mut [bool]) {
-        let scene = self.scene.handle;
-        match self.scene.device.api.queries {
-            Queries::V3 { occluded1, .. } => {
-                let mut context = Context3::INCOHERENT;
-                let context = &raw mut context;
-                self.occlude_all(occluded, |ray| {
-                    // SAFETY: as in `closest`.
-                    unsafe { occluded1(scene, context, ray) }
-                });
+            Call::Packet16 { coherent } => {
+                Box::new(Packets::new(scene, api.packet16, coherent, rays))
             }
-            Queries::V4 { occluded1, .. } => self.occlude_all(occluded, |ray| {
-                // SAFETY: as in `closest`.
-                unsafe { occluded1(scene, ray, null_mut()) }
-            }),
+            Call::Stream { calls, coherent } => Box::new(Stream::new(scene, calls, coherent, rays)),
         }
     }
-}
-
-/// A device of one thread, and the memory it has taken.
-struct Device {
-    handle: Handle,
-    api: &'static Api,
-    /// What the monitor has counted. Boxed, as Embree points to it.
-    allocated: Box<AtomicIsize>,
-}
-
-impl Device {
-    fn new(api: &'static Api, config: &CStr) -> Result<Self, EmbreeError> {
-        // SAFETY: the configuration is a C string.
-        let handle = unsafe { (api.new_device)(config.as_ptr()) };
-        if handle.is_null() {
-            // SAFETY: without a device, the error is the thread's.
-            return Err(EmbreeError(unsafe { (api.get_device_error)(null_mut()) }));
-        }
-        let allocated = Box::new(AtomicIsize::new(0));
-        let user = (&raw const *allocated).cast_mut().cast();
-        // SAFETY: the device is there, and the counter outlives it.
-        unsafe { (api.set_device_memory_monitor_function)(handle, count_memory, user) };
-        Ok(Self {
-            handle,
-            api,
-            allocated,
-        })
-    }
-
-    fn bytes(&self) -> usize {
-        usize::try_from(self.allocated.load(Ordering::Relaxed)).unwrap_or(0)
-    }
-
-    fn property(&self, property: c_int) -> isize {
-        // SAFETY: the device is there.
-        unsafe { (self.api.get_device_property)(self.handle, property) }
-    }
-
-    fn has_avx512(&self) -> bool {
-        let [_, sixteen] = ffi::PROPERTY_NATIVE_RAY;
-        self.property(sixteen) > 0
-    }
-
-    /// The version, and the widest vectors it uses here.
-    fn describe(&self) -> String {
-        let [major, minor, patch] = ffi::PROPERTY_VERSION.map(|part| self.property(part));
-        let vectors = match ffi::PROPERTY_NATIVE_RAY.map(|width| self.property(width) > 0) {
-            [_, true] => "AVX-512",
-            [true, false] => "AVX or AVX2",
-            [false, false] => "4-wide vectors",
-        };
-        format!("Embree {major}.{minor}.{patch} with {vectors}")
-    }
-}
-
-impl Drop for Device {
-    fn drop(&mut self) {
-        // SAFETY: released once, and after its scene, which holds it.
-        unsafe { (self.api.release_device)(self.handle) };
-    }
-}
-
-/// A committed scene of one mesh, on a device of its own, so that its memory is counted alone.
-struct Scene {
-    handle: Handle,
-    /// The buffers that Embree shares.
-    positions: Vec<[f32; 3]>,
-    indices: Vec<[u32; 3]>,
-    device: Device,
-}
-
-impl Scene {
-    fn new(device: Device, mesh: &TriangleMesh<'_>, flags: c_int) -> Result<Self, EmbreeError> {
-        let api = device.api;
-        let mut positions = mesh.positions().to_vec();
-        // Embree reads vertices 16 bytes at a time, past the end of the last.
-        positions.push([0.0; 3]);
-        let scene = Self {
-            // SAFETY: the device is there.
-            handle: unsafe { (api.new_scene)(device.handle) },
-            positions,
-            indices: mesh.indices().to_vec(),
-            device,
-        };
-        // SAFETY: all handles are of this device; Embree takes a null one, as of a scene that it
-        // could not make, for an error. The buffers hold as many elements as is said, the vertices
-        // with the padding that Embree asks for, and live as long as the scene.
-        unsafe {
-            (api.set_scene_build_quality)(scene.handle, ffi::BUILD_QUALITY_HIGH);
-            (api.set_scene_flags)(scene.handle, flags);
-            let geometry = (api.new_geometry)(scene.device.handle, ffi::GEOMETRY_TYPE_TRIANGLE);
-            let share = |buffer, format, data: *const c_void, items| {
-                let stride = 3 * size_of::<f32>();
-                (api.set_shared_geometry_buffer)(
-                    geometry, buffer, 0, format, data, 0, stride, items,
-                );
-            };
-            share(
-                ffi::BUFFER_TYPE_VERTEX,
-                ffi::FORMAT_FLOAT3,
-                scene.positions.as_ptr().cast(),
-                mesh.positions().len(),
-            );
-            share(
-                ffi::BUFFER_TYPE_INDEX,
-                ffi::FORMAT_UINT3,
-                scene.indices.as_ptr().cast(),
-                mesh.len(),
-            );
-            (api.commit_geometry)(geometry);
-            (api.attach_geometry)(scene.handle, geometry);
-            (api.release_geometry)(geometry);
-            (api.commit_scene)(scene.handle);
-            match (api.get_device_error)(scene.device.handle) {
-                ffi::ERROR_NONE => Ok(scene),
-                error => Err(EmbreeError(error)),
-            }
-        }
-    }
-}
-
-impl Drop for Scene {
-    fn drop(&mut self) {
-        if !self.handle.is_null() {
-            // SAFETY: released once, before the buffers and the device go.
-            unsafe { (self.device.api.release_scene)(self.handle) };
-        }
-    }
-}
-
-/// Adds up what Embree allocates (positive) and frees (negative).
-///
-/// # Safety
-/// `user` points to an [`AtomicIsize`].
-unsafe extern "C" fn count_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
-    // SAFETY: the caller promises it.
-    let allocated = unsafe { &*user.cast_const().cast::<AtomicIsize>() };
-    allocated.fetch_add(bytes, Ordering::Relaxed);
-    true
 }
