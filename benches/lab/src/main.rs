@@ -1,6 +1,7 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
 mod engines;
+mod exact;
 mod race;
 mod reference;
 

@@ -5,7 +5,7 @@
 //! the median of the rounds is the figure.
 
 mod record;
-mod table;
+pub mod table;
 mod workloads;
 
 use crate::{
