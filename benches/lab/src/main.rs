@@ -4,6 +4,7 @@ mod engines;
 mod exact;
 mod race;
 mod reference;
+mod stress;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -19,11 +20,13 @@ struct Args {
 #[derive(Subcommand)]
 enum Command {
     Race(race::Args),
+    Stress(stress::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Args::parse().command {
         Command::Race(args) => race::run(&args),
+        Command::Stress(args) => stress::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

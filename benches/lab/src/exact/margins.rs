@@ -95,12 +95,15 @@ fn slab(ray: &Ray, corners: [Vec3; 3], sheared: &Sheared, weights: [f64; 3], t_s
         .fold(Vec3::ZERO, |most, corner| most.max(corner.abs()));
     let extent = (bound + ray.origin.abs()).max_element().max(MIN_EXTENT);
     let mut worst = 0.0_f64;
+    let place = |axis: usize| -> f64 {
+        (weights.iter().zip(corners))
+            .map(|(weight, corner)| weight * f64::from(corner[axis]))
+            .sum()
+    };
     for axis in 0..3 {
         let r = (1.0 / sheared.direction[axis]).clamp(-(2f32.powi(48)), 2f32.powi(48));
         let at_origin = -(ray.origin[axis] * r);
-        let place: f64 = (0..3)
-            .map(|i| weights[i] * f64::from(corners[i][axis]))
-            .sum();
+        let place = place(axis);
         let rounded = place as f32;
         let low = if f64::from(rounded) > place {
             rounded.next_down()

@@ -85,6 +85,13 @@ impl Sheared {
         a.max(b).max(c)
     }
 
+    /// The t of the farthest corner, as computed: a triangle that is all before the range of t is never hit.
+    pub fn last(&self) -> f32 {
+        let reciprocal = 1.0 / self.direction[self.axes[2]];
+        let [a, b, c] = self.corners.map(|corner| corner.z * reciprocal);
+        a.max(b).max(c)
+    }
+
     /// Whether the crate's bounds hold: nothing may be near to overflow. See `MAX_EXTENT` in the crate's slab test.
     pub fn is_ordinary(&self, ray: &Ray) -> bool {
         let limit = 2f32.powi(76);
