@@ -23,6 +23,9 @@ pub struct Margins {
     pub t: f64,
     /// Of how far a plane of a box may seem to be on the wrong side of the hit.
     pub slab: f64,
+    /// The share of the box test's margin without which a box of the one point hit would be lost. No more than
+    /// `slab`: it takes two planes to lose a box.
+    pub gap: f64,
 }
 
 impl Margins {
@@ -32,6 +35,7 @@ impl Margins {
             shear: self.shear.max(other.shear),
             t: self.t.max(other.t),
             slab: self.slab.max(other.slab),
+            gap: self.gap.max(other.gap),
         }
     }
 }
@@ -58,7 +62,7 @@ pub fn margins(ray: &Ray, corners: [Vec3; 3], hit: Option<&Hit>) -> Margins {
         let depth = f64::from(sheared.depth().max(MIN_EXTENT));
         let bound = f64::from(K_T) * U * depth / f64::from(sheared.direction[z].abs());
         margins.t = (t - t_star).abs() / bound;
-        margins.slab = slab(ray, corners, &sheared, weights, t_star);
+        [margins.slab, margins.gap] = slab(ray, corners, &sheared, weights, t_star);
     }
     margins
 }
@@ -88,18 +92,26 @@ fn weights(sheared: &Sheared) -> [f64; 3] {
     weights.map(|w| w / sum)
 }
 
-/// The box test's formula without its margin, for a box of the one point: how late it enters, how early it leaves.
-fn slab(ray: &Ray, corners: [Vec3; 3], sheared: &Sheared, weights: [f64; 3], t_star: f64) -> f64 {
+/// The box test's formula without its margin, for a box of the one point: how late it enters or how early it leaves by
+/// one plane, and the margin without which it leaves before it enters.
+fn slab(
+    ray: &Ray,
+    corners: [Vec3; 3],
+    sheared: &Sheared,
+    weights: [f64; 3],
+    t_star: f64,
+) -> [f64; 2] {
     let bound = corners
         .iter()
         .fold(Vec3::ZERO, |most, corner| most.max(corner.abs()));
     let extent = (bound + ray.origin.abs()).max_element().max(MIN_EXTENT);
-    let mut worst = 0.0_f64;
     let place = |axis: usize| -> f64 {
         (weights.iter().zip(corners))
             .map(|(weight, corner)| weight * f64::from(corner[axis]))
             .sum()
     };
+    // With a fused operation and without, as backends differ; where each plane is met, and the unit of its margin.
+    let mut planes = [[[0.0; 3]; 3]; 2];
     for axis in 0..3 {
         let r = (1.0 / sheared.direction[axis]).clamp(-(2f32.powi(48)), 2f32.powi(48));
         let at_origin = -(ray.origin[axis] * r);
@@ -120,13 +132,20 @@ fn slab(ray: &Ray, corners: [Vec3; 3], sheared: &Sheared, weights: [f64; 3], t_s
         } else {
             (low, high)
         };
-        // With a fused operation and without, as backends differ.
-        for (near, far) in [
-            (near.mul_add(r, at_origin), far.mul_add(r, at_origin)),
-            (near * r + at_origin, far * r + at_origin),
-        ] {
-            let late = (f64::from(near) - t_star).max(t_star - f64::from(far));
-            worst = worst.max(late / (K_BOX * U * f64::from(extent) * f64::from(r.abs())));
+        let margin = K_BOX * U * f64::from(extent) * f64::from(r.abs());
+        let fused = [near.mul_add(r, at_origin), far.mul_add(r, at_origin)];
+        let apart = [near * r + at_origin, far * r + at_origin];
+        for (plane, [near, far]) in planes.iter_mut().zip([fused, apart]) {
+            plane[axis] = [f64::from(near), f64::from(far), margin];
+        }
+    }
+    let mut worst = [0.0_f64; 2];
+    for axes in planes {
+        for [near, far, margin] in axes {
+            worst[0] = worst[0].max((near - t_star).max(t_star - far) / margin);
+            for [_, other_far, other_margin] in axes {
+                worst[1] = worst[1].max((near - other_far) / (margin + other_margin));
+            }
         }
     }
     worst

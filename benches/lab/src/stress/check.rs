@@ -146,7 +146,14 @@ fn exact(
         let about = |what: String| format!("triangle {primitive}, {corners:?}: {what}");
         let alone = claims::check(ray, corners).map_err(about)?;
         tally.exact += 1;
-        tally.worst = tally.worst.max(margins(ray, corners, alone.as_ref()));
+        let margins = margins(ray, corners, alone.as_ref());
+        if margins.slab > 1.0 {
+            return Err(about(format!(
+                "a box is met {} times the margin late",
+                margins.slab
+            )));
+        }
+        tally.worst = tally.worst.max(margins);
 
         // The closest of all is no farther than this one.
         let Some(alone) = alone else {

@@ -47,6 +47,7 @@ pub struct Row {
     pub worst_t: f64,
     pub worst_shear: f64,
     pub worst_slab: f64,
+    pub worst_gap: f64,
 }
 
 impl Row {
@@ -62,6 +63,7 @@ impl Row {
             worst_t: tally.worst.t,
             worst_shear: tally.worst.shear,
             worst_slab: tally.worst.slab,
+            worst_gap: tally.worst.gap,
         }
     }
 }
@@ -79,6 +81,7 @@ pub fn table(rows: &[Row]) -> String {
         "t",
         "shear",
         "slab",
+        "gap",
     ];
     let cells = |row: &Row| {
         let counts = [
@@ -89,7 +92,7 @@ pub fn table(rows: &[Row]) -> String {
             row.hits,
             row.exact_checks,
         ];
-        let worst = [row.worst_t, row.worst_shear, row.worst_slab];
+        let worst = [row.worst_t, row.worst_shear, row.worst_slab, row.worst_gap];
         std::iter::once(row.family.to_owned())
             .chain(counts.map(|count| count.to_string()))
             .chain(worst.map(|worst| format!("{worst:.3}")))
@@ -102,7 +105,8 @@ pub fn table(rows: &[Row]) -> String {
     format!(
         "{}\
 answers: compared with brute force's, bit for bit. exact: rays and triangles checked in rationals.
-t, shear, slab: the largest error of t, of a sheared corner, of a box's plane, as a fraction of its bound.
+t, shear, slab: the largest error of t, of a sheared corner, of a box's plane, as a fraction of its bound;
+gap: the share of the box test's margin that a box could not have done without.
 ",
         align(&rows)
     )
