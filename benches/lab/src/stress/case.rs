@@ -13,10 +13,19 @@ pub struct Case {
     pub rays: Vec<Ray>,
     /// Every ray has to hit: it starts within a closed mesh.
     pub closed: bool,
-    /// Denormal numbers are flushed to zero.
-    pub flush: bool,
+    pub flush: Flush,
     /// One ray in so many is checked in exact arithmetic.
     pub exact_every: usize,
+}
+
+/// When denormal numbers are flushed to zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flush {
+    Never,
+    /// In queries, brute force's too, but not in the build: for meshes without denormal coordinates.
+    Queries,
+    /// In the build, too.
+    Throughout,
 }
 
 impl Case {
@@ -33,7 +42,7 @@ impl Case {
             mesh,
             rays,
             closed: false,
-            flush: false,
+            flush: Flush::Never,
             exact_every: 16,
         }
     }

@@ -1,7 +1,7 @@
 //! What is done with a case: brute force, every variant held to it, and brute force held to the exact reference.
 
 use super::{
-    case::Case,
+    case::{Case, Flush},
     flush::flushed,
     tally::Tally,
     variants::{self, Mismatch, show},
@@ -29,7 +29,7 @@ pub struct Violation {
 /// # Errors
 /// The first violation.
 pub fn check(case: &Case) -> Result<Tally, Box<Violation>> {
-    if case.flush {
+    if case.flush == Flush::Throughout {
         flushed(|| check_here(case))
     } else {
         check_here(case)
@@ -44,7 +44,12 @@ fn check_here(case: &Case) -> Result<Tally, Box<Violation>> {
             what: error.to_string(),
         })
     })?;
-    let (rays, expected) = expect(&mesh, &case.rays);
+    let flush_queries = case.flush == Flush::Queries;
+    let (rays, expected) = if flush_queries {
+        flushed(|| expect(&mesh, &case.rays))
+    } else {
+        expect(&mesh, &case.rays)
+    };
     let violation = |place: usize, what: String| {
         Box::new(Violation {
             ray: rays.get(place).copied(),
@@ -58,13 +63,15 @@ fn check_here(case: &Case) -> Result<Tally, Box<Violation>> {
     {
         return Err(violation(place, "a ray gets out of a closed mesh".into()));
     }
-    for place in (0..rays.len()).step_by(8) {
-        let any = reference::any_hit(&mesh, &rays[place]);
-        if any != expected[place].is_some() {
-            let what = format!(
-                "brute force: any hit {any}, closest {}",
-                show(expected[place])
-            );
+    for (place, expected) in expected.iter().enumerate().step_by(8) {
+        let any_hit = || reference::any_hit(&mesh, &rays[place]);
+        let any = if flush_queries {
+            flushed(any_hit)
+        } else {
+            any_hit()
+        };
+        if any != expected.is_some() {
+            let what = format!("brute force: any hit {any}, closest {}", show(*expected));
             return Err(violation(place, what));
         }
     }
@@ -76,7 +83,7 @@ fn check_here(case: &Case) -> Result<Tally, Box<Violation>> {
         hits: expected.iter().flatten().count() as u64,
         ..Tally::default()
     };
-    tally.checks = variants::check(&mesh, &case.tree, &rays, &expected).map_err(
+    tally.checks = variants::check(&mesh, &case.tree, &rays, &expected, flush_queries).map_err(
         |Mismatch { ray, variant, got }| {
             let expected = ray.map_or("a build".into(), |ray| show(expected[ray]));
             let what = format!("{variant}: {got}\nbrute force: {expected}");
@@ -87,7 +94,7 @@ fn check_here(case: &Case) -> Result<Tally, Box<Violation>> {
         },
     )?;
     // Denormals that are flushed are no part of the claims.
-    if !case.flush {
+    if case.flush == Flush::Never {
         for place in (0..rays.len()).step_by(case.exact_every) {
             exact(&mesh, &rays[place], expected[place], &mut tally)
                 .map_err(|what| violation(place, what))?;

@@ -3,6 +3,7 @@
 //! Three places grow with the crate: [`BUILDS`] by the builder's presets, [`check`] by layouts and widths,
 //! [`ask`] by kinds of call.
 
+use super::flush::flushed;
 use wide_bvh::{
     build::{BinaryTree, BuildError, Builder},
     geometry::{Hit, Ray, TriangleMesh},
@@ -51,7 +52,8 @@ const BUILDS: [Build; 4] = [
     },
 ];
 
-/// Holds every variant's answers to the `expected` ones, bit for bit. How many were compared.
+/// Holds every variant's answers to the `expected` ones, bit for bit; with denormals flushed to zero, in queries
+/// alone, if `flush` is set. How many were compared.
 ///
 /// # Errors
 /// The first that differs.
@@ -60,9 +62,10 @@ pub fn check(
     tree: &BinaryTree,
     rays: &[Ray],
     expected: &[Option<Hit>],
+    flush: bool,
 ) -> Result<u64, Mismatch> {
-    Ok(check_width::<Node8>(mesh, tree, rays, expected)?
-        + check_width::<Node4>(mesh, tree, rays, expected)?)
+    Ok(check_width::<Node8>(mesh, tree, rays, expected, flush)?
+        + check_width::<Node4>(mesh, tree, rays, expected, flush)?)
 }
 
 fn check_width<N: WideNode>(
@@ -70,6 +73,7 @@ fn check_width<N: WideNode>(
     tree: &BinaryTree,
     rays: &[Ray],
     expected: &[Option<Hit>],
+    flush: bool,
 ) -> Result<u64, Mismatch> {
     let finite = mesh.positions().iter().flatten().all(|x| x.is_finite());
     let mut checked = 0;
@@ -93,16 +97,22 @@ fn check_width<N: WideNode>(
         }
         for backend in Backend::available() {
             bvh.set_backend(backend);
-            let name = || format!("{name}, {}", backend.name());
-            checked += ask(&bvh, name, rays, expected)?;
+            let ask = || {
+                let name = || format!("{name}, {}", backend.name());
+                ask(&bvh, name, rays, expected)
+            };
+            checked += if flush { flushed(ask)? } else { ask()? };
         }
-        let borrowed = bvh.as_borrowed();
-        checked += ask(
-            &borrowed,
-            || format!("{name}, borrowed"),
-            &rays[..rays.len() / 8],
-            expected,
-        )?;
+        let some = &rays[..rays.len() / 8];
+        let ask = || {
+            ask(
+                &bvh.as_borrowed(),
+                || format!("{name}, borrowed"),
+                some,
+                expected,
+            )
+        };
+        checked += if flush { flushed(ask)? } else { ask()? };
         known.push(bvh);
     }
     Ok(checked)

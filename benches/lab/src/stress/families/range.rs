@@ -3,7 +3,7 @@
 use super::meshes;
 use crate::stress::{
     aim::{ALL, Reach, log_uniform, rays, sign, unit},
-    case::Case,
+    case::{Case, Flush},
 };
 use fastrand::Rng;
 use glam::Vec3;
@@ -122,7 +122,13 @@ pub fn flush(rng: &mut Rng) -> Case {
             at(rng, mesh, Reach::NEAR)
         }
     };
-    case.flush = true;
+    let is_normal = |x: &f32| *x == 0.0 || x.is_normal();
+    let all_normal = case.mesh.positions.iter().flatten().all(is_normal);
+    case.flush = if all_normal && rng.bool() {
+        Flush::Queries
+    } else {
+        Flush::Throughout
+    };
     case
 }
 
