@@ -19,6 +19,7 @@ use std::{
     error::Error,
     fmt::Write as _,
     fs::File,
+    panic::catch_unwind,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
@@ -131,7 +132,7 @@ fn stress(
                 if failed.load(Ordering::Relaxed) {
                     return None;
                 }
-                let result = check::check(&Case::new(families[family], seed, number));
+                let result = run_case(families[family], seed, number);
                 match &result {
                     Ok(tally) => progress.inc(tally.rays),
                     Err(_) => failed.store(true, Ordering::Relaxed),
@@ -171,6 +172,19 @@ fn stress(
         .zip(&tallies)
         .map(|(family, tally)| Row::new(family.name, tally))
         .collect())
+}
+
+/// Makes a case and checks it. A panic is a violation, too.
+fn run_case(family: &Family, seed: u64, number: u64) -> Result<Tally, Box<Violation>> {
+    catch_unwind(|| check::check(&Case::new(family, seed, number))).unwrap_or_else(|panic| {
+        let message = panic.downcast_ref::<String>().cloned();
+        let message = message.or_else(|| panic.downcast_ref::<&str>().map(|text| text.to_string()));
+        Err(Box::new(Violation {
+            ray: None,
+            place: 0,
+            what: format!("a panic: {}", message.unwrap_or_default()),
+        }))
+    })
 }
 
 /// All that is needed to see a violation again.
@@ -224,6 +238,20 @@ mod tests {
             assert_eq!(a.mesh.indices, b.mesh.indices);
             assert_ne!(bits(&a), bits(&Case::new(family, 2, 3)), "{}", family.name);
         }
+    }
+
+    #[test]
+    fn a_panic_is_a_violation() {
+        let family = Family {
+            name: "panics",
+            about: "",
+            flushes: false,
+            case: |rng| panic!("number {}", rng.u32(7..8)),
+        };
+        assert_eq!(
+            run_case(&family, 1, 0).unwrap_err().what,
+            "a panic: number 7"
+        );
     }
 
     /// What brute force and the variants are held to has teeth of its own.
