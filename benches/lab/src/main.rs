@@ -2,11 +2,13 @@
 
 mod effort;
 mod engines;
+mod exact;
 mod limit;
 mod race;
 mod reference;
 mod scenes;
 mod stats;
+mod stress;
 mod text;
 mod workloads;
 
@@ -25,12 +27,14 @@ struct Args {
 enum Command {
     Limit(limit::Args),
     Race(race::Args),
+    Stress(stress::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Args::parse().command {
         Command::Limit(args) => limit::run(&args),
         Command::Race(args) => race::run(&args),
+        Command::Stress(args) => stress::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -55,7 +55,12 @@ fn of_width<N: WideNode + Send + 'static>(
     let mut kinds: Vec<(String, Backend, Make<N>)> = Vec::new();
     for backend in Backend::available() {
         let name = format!("wide-bvh {} {}", N::WIDTH, backend.name());
-        kinds.push((name, backend, WideBvh::<N, OneByOne>::boxed));
+        kinds.push((name.clone(), backend, WideBvh::<N, OneByOne>::boxed));
+        kinds.push((
+            format!("{name} batch"),
+            backend,
+            WideBvh::<N, AllAtOnce>::boxed,
+        ));
     }
     kinds.retain(|(name, ..)| chosen(name));
     if kinds.is_empty() {
@@ -113,6 +118,21 @@ impl Call for OneByOne {
         for (ray, occluded) in rays.iter().zip(occluded) {
             *occluded = bvh.any_hit(ray);
         }
+    }
+}
+
+/// All in one call.
+struct AllAtOnce;
+
+impl Call for AllAtOnce {
+    const TAKES: Takes = Takes::Batches;
+
+    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        bvh.closest_hits(rays, hits);
+    }
+
+    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]) {
+        bvh.any_hits(rays, occluded);
     }
 }
 

@@ -1,0 +1,439 @@
+//! What the crate's documents claim of one ray and one triangle, checked without rounding.
+//!
+//! Let u = 2^-24, M the largest distance of a corner from the ray's origin on any axis, Z the largest along the axis of
+//! the shear (both no less than 2^-70), and x', y', z the corners after the shear, as computed. Brute force over the one
+//! triangle, t without bounds, is held to these:
+//!
+//! 1. x' and y' are within 7uM of the exact shear X - Z·(d.x / d.z), corner by corner.
+//! 2. It hits just when 0 is in the closed triangle of x' and y', which is not degenerate, nor is that of the mesh.
+//! 3. It differs from the definition in space ([`intersect`]) only where the line passes an edge that near: some edge
+//!    function p × q of exact shears p and q is no larger than what corners moved by δ = 7uM on each axis can
+//!    change it by, δ·(|p.x| + |p.y| + |q.x| + |q.y|) + 2δ².
+//! 4. t is within 66·uZ / |d.z| of t* = Σ w·z / d.z, with the exact weights w of 0 in the triangle of x' and y'.
+//! 5. u and v are within 8u·X·Y / |det| + 5u of those weights, where X and Y are the largest |x'| and |y'|.
+//! 6. t is within 66·uZ / |d.z| + δ·(|n.x| + |n.y|) / |n·d| of the t of the definition, where both hit and n is the
+//!    triangle's normal: a point δ beside the ray leaves the plane by no more.
+//! 7. The box test passes the least box of floats around P = Σ w·corner, in a scene of the triangle alone, for t as far
+//!    as computed and no farther: on every backend, in nodes of either width. And it passes the triangle's own box
+//!    wherever the ray, by definition, meets it.
+//!
+//! 1 to 3 leave no room: which triangles are hit is decided by rounding within δ of an edge alone, and
+//! then as the rounded corners say. Where scenes are beyond 2^76 the crate promises less, and nothing is checked.
+
+use super::{
+    cuboid,
+    number::{Number, Point, abs, between_floats, cross, dot, exact, point, sub},
+    sheared::Sheared,
+    triangle::{ExactHit, intersect, is_degenerate},
+};
+use glam::Vec3;
+use wide_bvh::{
+    geometry::{Aabb, Hit, Ray, TriangleMesh},
+    layout::{Child, Node4, Node8, WideNode},
+    reference,
+    simd::Backend,
+    traverse::sweep::count_boxes,
+};
+
+/// The unit roundoff.
+const U: f32 = 1.0 / (1 << 24) as f32;
+/// No distance counts for less when errors are bounded: what a result that is denormal may lose.
+pub const MIN_EXTENT: f32 = 1.0 / (1_u128 << 70) as f32;
+/// How far corners are moved by rounding: claim 1.
+pub const K_SHEAR: f32 = 7.0;
+/// How far t is off: claim 4.
+pub const K_T: f32 = 66.0;
+
+/// What brute force says of a triangle by itself, whatever t.
+///
+/// # Errors
+/// The first claim that does not hold, with figures.
+pub fn check(ray: &Ray, corners: [Vec3; 3]) -> Result<Option<Hit>, String> {
+    let ray = ray.with_range(f32::NEG_INFINITY, f32::INFINITY);
+    let hit = brute_force(&ray, corners);
+    let Some(sheared) = Sheared::new(&ray, corners) else {
+        return match hit {
+            None => Ok(None),
+            Some(_) => Err(format!("a ray that makes no sense: {hit:?}")),
+        };
+    };
+    if !corners.iter().all(|corner| corner.is_finite()) || !sheared.is_ordinary(&ray) {
+        return Ok(hit);
+    }
+
+    let claims = Claims {
+        ray: &ray,
+        corners,
+        exact_corners: corners.map(point),
+        exact_direction: point(ray.direction),
+        exact_origin: point(ray.origin),
+        delta: exact(K_SHEAR) * exact(U) * exact(sheared.distance().max(MIN_EXTENT)),
+        sheared: &sheared,
+    };
+    claims.shear()?;
+    let weights = claims.weights();
+    if hit.is_some() != weights.is_some() {
+        return Err(format!(
+            "claim 2: {hit:?}, but by the exact signs of {:?}: {}",
+            sheared.corners,
+            if weights.is_some() { "a hit" } else { "a miss" }
+        ));
+    }
+    let defined = intersect(
+        &claims.exact_origin,
+        &claims.exact_direction,
+        &claims.exact_corners,
+    );
+    if hit.is_some() != defined.is_some() && !claims.is_near_an_edge() {
+        return Err(format!(
+            "claim 3: {hit:?}, by definition {}",
+            show(defined.as_ref())
+        ));
+    }
+    if let (Some(hit), Some(weights)) = (&hit, &weights) {
+        claims.t(hit, weights, defined.as_ref())?;
+        claims.uv(hit, weights)?;
+        claims.least_box(hit, weights)?;
+    }
+    claims.own_box()?;
+    Ok(hit)
+}
+
+fn brute_force(ray: &Ray, corners: [Vec3; 3]) -> Option<Hit> {
+    let mesh = TriangleMesh::new(&corners, &[[0, 1, 2_u32]]).expect("three corners");
+    reference::closest_hit(&mesh, ray)
+}
+
+fn show(hit: Option<&ExactHit>) -> String {
+    hit.map_or("a miss".into(), |hit| {
+        let [t, u, v] = [&hit.t, &hit.u, &hit.v].map(|x| x.to_f64_fast());
+        format!("a hit, t about {t:e}, u {u:e}, v {v:e}")
+    })
+}
+
+struct Claims<'a> {
+    ray: &'a Ray,
+    corners: [Vec3; 3],
+    sheared: &'a Sheared,
+    exact_origin: Point,
+    exact_direction: Point,
+    exact_corners: [Point; 3],
+    delta: Number,
+}
+
+impl Claims<'_> {
+    /// The corners' exact shear, in multiples of d.z.
+    fn exact_shear(&self) -> [[Number; 2]; 3] {
+        let [x, y, z] = self.sheared.axes;
+        let d = &self.exact_direction;
+        self.exact_corners.each_ref().map(|corner| {
+            let moved = sub(corner, &self.exact_origin);
+            [x, y].map(|axis| &moved[axis] * &d[z] - &moved[z] * &d[axis])
+        })
+    }
+
+    /// The magnitude of d.z.
+    fn length(&self) -> Number {
+        abs(&self.exact_direction[self.sheared.axes[2]])
+    }
+
+    fn shear(&self) -> Result<(), String> {
+        let dz = &self.exact_direction[self.sheared.axes[2]];
+        let most = &self.delta * self.length();
+        for (computed, exactly) in self.sheared.corners.iter().zip(self.exact_shear()) {
+            for (computed, exactly) in [computed.x, computed.y].into_iter().zip(exactly) {
+                let off = abs(&(exact(computed) * dz - exactly));
+                if off > most {
+                    let bounds = (off / &most).to_f64_fast();
+                    return Err(format!(
+                        "claim 1: {computed} is off by {bounds} times the bound"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The weights of the corners, of sum 1, at which the computed triangle has 0; `None` for a miss.
+    fn weights(&self) -> Option<[Number; 3]> {
+        let [a, b, c] = self
+            .sheared
+            .corners
+            .map(|corner| [exact(corner.x), exact(corner.y)]);
+        let edge = |p: &[Number; 2], q: &[Number; 2]| &p[0] * &q[1] - &p[1] * &q[0];
+        let weights = [edge(&b, &c), edge(&c, &a), edge(&a, &b)];
+        let zero = Number::ZERO;
+        let inside = weights.iter().all(|w| *w >= zero) || weights.iter().all(|w| *w <= zero);
+        let sum = &weights[0] + &weights[1] + &weights[2];
+        let hit = inside && sum != zero && !is_degenerate(&self.exact_corners);
+        hit.then(|| weights.map(|w| w / &sum))
+    }
+
+    fn is_near_an_edge(&self) -> bool {
+        // All in multiples of d.z.
+        let [a, b, c] = self.exact_shear();
+        let delta = &self.delta * self.length();
+        let is_near = |p: &[Number; 2], q: &[Number; 2]| {
+            let size = abs(&p[0]) + abs(&p[1]) + abs(&q[0]) + abs(&q[1]);
+            let edge = abs(&(&p[0] * &q[1] - &p[1] * &q[0]));
+            edge <= &delta * (size + exact(2.0) * &delta)
+        };
+        is_near(&a, &b) || is_near(&b, &c) || is_near(&c, &a)
+    }
+
+    /// Σ w·z / d.z
+    fn t_star(&self, weights: &[Number; 3]) -> Number {
+        let [a, b, c] = self.sheared.corners.map(|corner| exact(corner.z));
+        let z = &weights[0] * a + &weights[1] * b + &weights[2] * c;
+        z / &self.exact_direction[self.sheared.axes[2]]
+    }
+
+    /// How far t may be off t*. Besides the bound, what is lost where t is denormal in the caller's unit.
+    fn t_bound(&self) -> Number {
+        let z = exact(self.sheared.depth().max(MIN_EXTENT));
+        exact(K_T) * exact(U) * z / self.length() + exact(f32::from_bits(1))
+    }
+
+    fn t(
+        &self,
+        hit: &Hit,
+        weights: &[Number; 3],
+        defined: Option<&ExactHit>,
+    ) -> Result<(), String> {
+        if !hit.t.is_finite() || hit.t.abs() == f32::MAX {
+            // More than a float holds in the caller's unit.
+            return Ok(());
+        }
+        let (t_star, bound) = (self.t_star(weights), self.t_bound());
+        let off = abs(&(exact(hit.t) - &t_star));
+        if off > bound {
+            let (t, bounds) = (t_star.to_f64_fast(), (off / bound).to_f64_fast());
+            return Err(format!(
+                "claim 4: {hit:?}, t* = {t:e}, off by {bounds} times the bound"
+            ));
+        }
+        let Some(defined) = defined else {
+            return Ok(());
+        };
+        let [a, b, c] = &self.exact_corners;
+        let normal = cross(&sub(b, a), &sub(c, a));
+        let [x, y, _] = self.sheared.axes;
+        let slope = (abs(&normal[x]) + abs(&normal[y])) / abs(&dot(&normal, &self.exact_direction));
+        let bound = bound + &self.delta * slope;
+        let off = abs(&(exact(hit.t) - &defined.t));
+        if off > bound {
+            let (defined, bounds) = (show(Some(defined)), (off / bound).to_f64_fast());
+            return Err(format!(
+                "claim 6: {hit:?}, by definition {defined}: off by {bounds} bounds"
+            ));
+        }
+        Ok(())
+    }
+
+    fn uv(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
+        let corners = self
+            .sheared
+            .corners
+            .map(|corner| [exact(corner.x), exact(corner.y)]);
+        let [a, b, c] = &corners;
+        let [ab, ac] = [b, c].map(|p| [&p[0] - &a[0], &p[1] - &a[1]]);
+        let determinant = abs(&(&ab[0] * &ac[1] - &ab[1] * &ac[0]));
+        let largest = |axis: usize| {
+            let [a, b, c] = corners.each_ref().map(|corner| abs(&corner[axis]));
+            a.max(b).max(c)
+        };
+        let bound = exact(U) * (exact(8.0) * largest(0) * largest(1) / determinant + exact(5.0));
+        for (computed, exactly) in [hit.u, hit.v].into_iter().zip(&weights[1..]) {
+            let off = abs(&(exact(computed) - exactly));
+            if off > bound {
+                let bounds = (off / bound).to_f64_fast();
+                return Err(format!(
+                    "claim 5: {hit:?}, a weight is off by {bounds} bounds"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Claim 7 for the least box around P.
+    fn least_box(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
+        // Beyond, t in the caller's unit is not what the box test compares with.
+        let scaled = self.sheared.scale != 1.0;
+        if !hit.t.is_finite() || scaled && !(1e-30..1e30).contains(&hit.t.abs()) && hit.t != 0.0 {
+            return Ok(());
+        }
+        let (low, high) = self.least_box_around(weights);
+        let ray = self.ray.with_range(hit.t, hit.t);
+        self.passes(&Aabb::new(low, high), &ray)
+            .map_err(|backend| format!("claim 7: {hit:?} is lost in {low}, {high} by {backend}"))
+    }
+
+    fn least_box_around(&self, weights: &[Number; 3]) -> (Vec3, Vec3) {
+        let [a, b, c] = &self.exact_corners;
+        let ends = [0, 1, 2].map(|axis| {
+            let [wa, wb, wc] = weights;
+            between_floats(&(wa * &a[axis] + wb * &b[axis] + wc * &c[axis]))
+        });
+        (ends.map(|end| end.0).into(), ends.map(|end| end.1).into())
+    }
+
+    /// Claim 7 for the triangle's box, by definition.
+    fn own_box(&self) -> Result<(), String> {
+        let aabb = Aabb::from_points(self.corners);
+        let Some(interval) = cuboid::interval(&self.exact_origin, &self.exact_direction, &aabb)
+        else {
+            return Ok(());
+        };
+        if interval
+            .iter()
+            .any(|t| abs(t) > exact(1e30) || abs(t) < exact(1e-30) && *t != Number::ZERO)
+        {
+            return Ok(());
+        }
+        let [(from, _), (_, to)] = interval.each_ref().map(between_floats);
+        self.passes(&aabb, &self.ray.with_range(from, to))
+            .map_err(|backend| {
+                format!("claim 7: the box that is met from {from} to {to} is lost by {backend}")
+            })
+    }
+
+    /// Whether every box test passes `aabb` in a scene of this triangle; else which does not.
+    fn passes(&self, aabb: &Aabb, ray: &Ray) -> Result<(), String> {
+        let scene = Aabb::from_points(self.corners);
+        for backend in Backend::available() {
+            for (width, passed) in [
+                (4, count::<Node4>(backend, aabb, &scene, ray)),
+                (8, count::<Node8>(backend, aabb, &scene, ray)),
+            ] {
+                if passed != 1 {
+                    return Err(format!("{width}-wide, {}", backend.name()));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn count<N: WideNode>(backend: Backend, aabb: &Aabb, scene: &Aabb, ray: &Ray) -> u32 {
+    let node = N::from_children([(*aabb, Child::leaf(0))]);
+    count_boxes(backend, &[node], scene, ray)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn claims_hold_for_random_triangles() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let (mut hits, mut misses) = (0, 0);
+        for i in 0..1000 {
+            let mut any = || Vec3::from([(); 3].map(|()| random.f32() - 0.5));
+            let corners = [any(), any(), any()];
+            let origin = any() * 10.0;
+            let target = if i % 2 == 0 {
+                corners[0]
+            } else {
+                corners[0].lerp(any(), 0.5)
+            };
+            match check(&Ray::new(origin, target - origin), corners) {
+                Ok(Some(_)) => hits += 1,
+                Ok(None) => misses += 1,
+                Err(broken) => panic!("{broken}"),
+            }
+        }
+        assert!(hits > 200 && misses > 200, "{hits} {misses}");
+    }
+
+    #[test]
+    fn rays_and_triangles_that_make_no_sense_are_missed() {
+        let corners = [Vec3::X, Vec3::Y, Vec3::Z];
+        for ray in [
+            Ray::new([0.0; 3], [0.0; 3]),
+            Ray::new([0.0; 3], [f32::NAN, 1.0, 1.0]),
+            Ray::new([f32::INFINITY; 3], [1.0; 3]),
+        ] {
+            assert_eq!(check(&ray, corners), Ok(None));
+        }
+        let ray = Ray::new([0.0; 3], [1.0; 3]);
+        assert!(check(&ray, corners).unwrap().is_some());
+        assert_eq!(
+            check(&ray, [Vec3::X, Vec3::Y, Vec3::splat(f32::NAN)]),
+            Ok(None)
+        );
+        assert_eq!(
+            check(&ray, [Vec3::ZERO, Vec3::ONE, Vec3::ONE * 2.0]),
+            Ok(None)
+        );
+    }
+
+    /// A claim that is broken is seen: answers for a triangle are held against another's.
+    #[test]
+    fn broken_claims_are_seen() {
+        let ray = Ray::new([0.0, 0.0, -1.0], [0.1, 0.2, 1.0]);
+        let corners = [
+            Vec3::new(-1.0, -1.0, 0.5),
+            Vec3::new(2.0, -1.0, 0.7),
+            Vec3::new(0.0, 2.0, 0.1),
+        ];
+        let sheared = Sheared::new(&ray, corners).unwrap();
+        let claims = Claims {
+            ray: &ray,
+            corners,
+            exact_corners: corners.map(point),
+            exact_direction: point(ray.direction),
+            exact_origin: point(ray.origin),
+            delta: exact(K_SHEAR) * exact(U) * exact(sheared.distance()),
+            sheared: &sheared,
+        };
+        let weights = claims.weights().unwrap();
+        let defined = intersect(
+            &claims.exact_origin,
+            &claims.exact_direction,
+            &claims.exact_corners,
+        );
+        let hit = brute_force(&ray, corners).unwrap();
+        assert!(claims.shear().is_ok() && !claims.is_near_an_edge());
+        assert!(claims.t(&hit, &weights, defined.as_ref()).is_ok());
+        assert!(claims.uv(&hit, &weights).is_ok() && claims.least_box(&hit, &weights).is_ok());
+
+        let off = Hit {
+            t: hit.t * (1.0 + 1e-5),
+            ..hit
+        };
+        assert!(
+            claims
+                .t(&off, &weights, None)
+                .unwrap_err()
+                .starts_with("claim 4")
+        );
+        let off = Hit {
+            v: hit.v + 1e-5,
+            ..hit
+        };
+        assert!(
+            claims
+                .uv(&off, &weights)
+                .unwrap_err()
+                .starts_with("claim 5")
+        );
+        let far = Hit {
+            t: hit.t + 0.1,
+            ..hit
+        };
+        assert!(
+            claims
+                .least_box(&far, &weights)
+                .unwrap_err()
+                .starts_with("claim 7")
+        );
+
+        let mut moved = sheared;
+        moved.corners[1].x += 1e-5;
+        let claims = Claims {
+            sheared: &moved,
+            ..claims
+        };
+        assert!(claims.shear().unwrap_err().starts_with("claim 1"));
+    }
+}

@@ -1,0 +1,184 @@
+//! Every way to ask this crate, held to the same answers.
+//!
+//! Three places grow with the crate: [`BUILDS`] by the builder's presets, [`check`] by layouts and widths,
+//! [`ask`] by kinds of call.
+
+use super::flush::flushed;
+use wide_bvh::{
+    build::{BinaryTree, BuildError, Builder},
+    geometry::{Hit, Ray, TriangleMesh},
+    layout::{Bvh, Node4, Node8, Owned, Storage, TriangleLeaf, WideNode},
+    simd::Backend,
+};
+
+/// An answer that is not brute force's.
+#[derive(Debug)]
+pub struct Mismatch {
+    /// The ray's place; `None` where the build failed.
+    pub ray: Option<usize>,
+    /// The build, width, backend and call.
+    pub variant: String,
+    /// What it answered.
+    pub got: String,
+}
+
+/// How a hierarchy comes to be.
+struct Build {
+    name: &'static str,
+    builder: fn() -> Builder,
+    from_tree: bool,
+}
+
+const BUILDS: [Build; 4] = [
+    Build {
+        name: "default build",
+        builder: Builder::new,
+        from_tree: false,
+    },
+    Build {
+        name: "no splits",
+        builder: || Builder::new().splits(0.0),
+        from_tree: false,
+    },
+    Build {
+        name: "many splits",
+        builder: || Builder::new().splits(4.0),
+        from_tree: false,
+    },
+    Build {
+        name: "from a tree",
+        builder: Builder::new,
+        from_tree: true,
+    },
+];
+
+/// Holds every variant's answers to the `expected` ones, bit for bit; with denormals flushed to zero, in queries
+/// alone, if `flush` is set. How many were compared.
+///
+/// # Errors
+/// The first that differs.
+pub fn check(
+    mesh: &TriangleMesh,
+    tree: &BinaryTree,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    flush: bool,
+) -> Result<u64, Mismatch> {
+    Ok(check_width::<Node8>(mesh, tree, rays, expected, flush)?
+        + check_width::<Node4>(mesh, tree, rays, expected, flush)?)
+}
+
+fn check_width<N: WideNode>(
+    mesh: &TriangleMesh,
+    tree: &BinaryTree,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    flush: bool,
+) -> Result<u64, Mismatch> {
+    let finite = mesh.positions().iter().flatten().all(|x| x.is_finite());
+    let mut checked = 0;
+    let mut known: Vec<Bvh<N, TriangleLeaf, Owned>> = Vec::new();
+    for build in &BUILDS {
+        let name = format!("{}, {}-wide", build.name, N::WIDTH);
+        let builder = (build.builder)().drop_non_finite(!finite);
+        let built = if build.from_tree {
+            builder.build_from_tree_as(mesh, tree)
+        } else {
+            builder.build_as(mesh)
+        };
+        let mut bvh: Bvh<N, _, _> = built.map_err(|error: BuildError| Mismatch {
+            ray: None,
+            variant: name.clone(),
+            got: error.to_string(),
+        })?;
+        // One that came out the same, byte for byte, answers the same.
+        if known.iter().any(|other| same_bytes(&bvh, other)) {
+            continue;
+        }
+        for backend in Backend::available() {
+            bvh.set_backend(backend);
+            let ask = || {
+                let name = || format!("{name}, {}", backend.name());
+                ask(&bvh, name, rays, expected)
+            };
+            checked += if flush { flushed(ask)? } else { ask()? };
+        }
+        let some = &rays[..rays.len() / 8];
+        let ask = || {
+            ask(
+                &bvh.as_borrowed(),
+                || format!("{name}, borrowed"),
+                some,
+                expected,
+            )
+        };
+        checked += if flush { flushed(ask)? } else { ask()? };
+        known.push(bvh);
+    }
+    Ok(checked)
+}
+
+fn same_bytes<N: WideNode>(
+    a: &Bvh<N, TriangleLeaf, Owned>,
+    b: &Bvh<N, TriangleLeaf, Owned>,
+) -> bool {
+    fn same<T: bytemuck::Pod>(a: &[T], b: &[T]) -> bool {
+        bytemuck::cast_slice::<T, u8>(a) == bytemuck::cast_slice::<T, u8>(b)
+    }
+    same(a.nodes(), b.nodes()) && same(a.leaves(), b.leaves()) && a.primitives() == b.primitives()
+}
+
+/// Every kind of call, over all rays. Batches belong here.
+fn ask<N: WideNode, S: Storage>(
+    bvh: &Bvh<N, TriangleLeaf, S>,
+    name: impl Fn() -> String,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+) -> Result<u64, Mismatch> {
+    let wrong = |ray: usize, call: &str, got: String| Mismatch {
+        ray: Some(ray),
+        variant: format!("{}, {call}", name()),
+        got,
+    };
+    let mut checked = 0;
+    for (place, (ray, expected)) in rays.iter().zip(expected).enumerate() {
+        let hit = bvh.closest_hit(ray);
+        if bits(hit) != bits(*expected) {
+            return Err(wrong(place, "closest_hit", show(hit)));
+        }
+        let any = bvh.any_hit(ray);
+        if any != expected.is_some() {
+            return Err(wrong(place, "any_hit", any.to_string()));
+        }
+        let (hit, _) = bvh.closest_hit_counted(ray);
+        if bits(hit) != bits(*expected) {
+            return Err(wrong(place, "closest_hit_counted", show(hit)));
+        }
+        checked += 3;
+    }
+    Ok(checked)
+}
+
+/// As bits, for -0 to differ from 0.
+fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
+    hit.map(|hit| {
+        [
+            hit.t.to_bits(),
+            hit.u.to_bits(),
+            hit.v.to_bits(),
+            hit.primitive,
+        ]
+    })
+}
+
+/// A hit for people, with its bits.
+pub fn show(hit: Option<Hit>) -> String {
+    match hit {
+        None => "no hit".into(),
+        Some(hit) => {
+            let Hit { t, u, v, primitive } = hit;
+            let [tb, ub, vb] = [t, u, v].map(f32::to_bits);
+            format!("triangle {primitive}, t {t:e} ({tb:#x}), u {u:e} ({ub:#x}), v {v:e} ({vb:#x})")
+        }
+    }
+}
