@@ -6,6 +6,7 @@
 use super::{
     binary::{BinaryNode, BinaryTree},
     input::Input,
+    monitor::{STRIDE, Watch},
     parallel::{TASK, join},
     refs::{Bounds, Ref, Refs},
     split::Cut,
@@ -19,12 +20,12 @@ use std::{vec, vec::Vec};
 const MAX_DEPTH: u32 = 64;
 
 /// The tree over all of `refs`, one primitive a leaf.
-pub(super) fn build<I: Input>(input: &I, refs: Refs) -> BinaryTree {
+pub(super) fn build<I: Input>(input: &I, refs: Refs, watch: &Watch) -> BinaryTree {
     let mut refs = refs.refs;
     if refs.is_empty() {
         return BinaryTree::default();
     }
-    let nodes = subtree(input, &mut refs, 0, 1);
+    let nodes = subtree(input, &mut refs, 0, 1, watch);
     let order = refs.iter().map(Ref::id).collect();
     BinaryTree::new_unchecked(nodes, order)
 }
@@ -36,6 +37,7 @@ pub(super) fn subtree<I: Input>(
     refs: &mut [Ref],
     first: usize,
     below: usize,
+    watch: &Watch,
 ) -> Vec<BinaryNode> {
     let centers = bounds_of_centers(refs);
     let mut nodes = vec![BinaryNode::zeroed(); 2 * refs.len() - 1];
@@ -49,6 +51,7 @@ pub(super) fn subtree<I: Input>(
             nodes,
             first: first as u32,
             below: below as u32,
+            watch,
         }
         .build();
     }
@@ -69,6 +72,7 @@ struct Task<'a, I> {
     first: u32,
     /// The place of `nodes[0]` in the tree.
     below: u32,
+    watch: &'a Watch<'a>,
 }
 
 impl<I: Input> Task<'_, I> {
@@ -82,9 +86,15 @@ impl<I: Input> Task<'_, I> {
             nodes,
             first,
             below,
+            watch,
         } = self;
         if refs.len() <= sweep::MAX {
-            sweep::build(input, refs, first, root, nodes, below);
+            if watch.advance(refs.len()) {
+                sweep::build(input, refs, first, root, nodes, below);
+            }
+            return;
+        }
+        if refs.len() > STRIDE && !watch.advance(0) {
             return;
         }
         let (mid, left_centers, right_centers) = split(refs, &centers, depth);
@@ -105,6 +115,7 @@ impl<I: Input> Task<'_, I> {
             nodes: left_nodes,
             first,
             below: below_left,
+            watch,
         };
         let right = Task {
             input,
@@ -115,6 +126,7 @@ impl<I: Input> Task<'_, I> {
             nodes: right_nodes,
             first: first + mid as u32,
             below: below_right,
+            watch,
         };
         join(worth_it, || left.build(), || right.build());
         *root = BinaryNode {
