@@ -8,6 +8,7 @@ use super::{
     lay_out::{Part, below_inner, lay_out},
     monitor::Watch,
     refs::{Ref, Refs},
+    sweep::Leaves,
 };
 use crate::geometry::TriangleMesh;
 use core::ops::ControlFlow;
@@ -46,7 +47,7 @@ pub(super) fn adopt<I: Input>(
         }
         let leaf = listed(tree, &tree.nodes()[index]);
         let mut kept: Vec<_> = leaf.filter_map(|&id| places.of(&refs.refs, id)).collect();
-        let subtree = binned::subtree(input, &mut kept, order.len(), below, watch);
+        let subtree = binned::subtree(input, &mut kept, order.len(), below, Leaves::SINGLE, watch);
         order.extend(kept.iter().map(Ref::id));
         Part::Tree(subtree)
     });

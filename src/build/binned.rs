@@ -6,11 +6,12 @@
 use super::{
     binary::{BinaryNode, BinaryTree},
     input::Input,
+    lay_out::prune,
     monitor::{STRIDE, Watch},
     parallel::{TASK, join},
     refs::{Bounds, Ref, Refs},
     split::Cut,
-    sweep,
+    sweep::{self, Leaves},
 };
 use bytemuck::Zeroable;
 use std::{vec, vec::Vec};
@@ -20,12 +21,12 @@ use std::{vec, vec::Vec};
 const MAX_DEPTH: u32 = 64;
 
 /// The tree over all of `refs`, one primitive a leaf.
-pub(super) fn build<I: Input>(input: &I, refs: Refs, watch: &Watch) -> BinaryTree {
+pub(super) fn build<I: Input>(input: &I, refs: Refs, leaves: Leaves, watch: &Watch) -> BinaryTree {
     let mut refs = refs.refs;
     if refs.is_empty() {
         return BinaryTree::default();
     }
-    let nodes = subtree(input, &mut refs, 0, 1, watch);
+    let nodes = prune(subtree(input, &mut refs, 0, 1, leaves, watch), leaves);
     let order = refs.iter().map(Ref::id).collect();
     BinaryTree::new_unchecked(nodes, order)
 }
@@ -37,6 +38,7 @@ pub(super) fn subtree<I: Input>(
     refs: &mut [Ref],
     first: usize,
     below: usize,
+    leaves: Leaves,
     watch: &Watch,
 ) -> Vec<BinaryNode> {
     let centers = bounds_of_centers(refs);
@@ -51,6 +53,7 @@ pub(super) fn subtree<I: Input>(
             nodes,
             first: first as u32,
             below: below as u32,
+            leaves,
             watch,
         }
         .build();
@@ -72,6 +75,7 @@ struct Task<'a, I> {
     first: u32,
     /// The place of `nodes[0]` in the tree.
     below: u32,
+    leaves: Leaves,
     watch: &'a Watch<'a>,
 }
 
@@ -86,11 +90,12 @@ impl<I: Input> Task<'_, I> {
             nodes,
             first,
             below,
+            leaves,
             watch,
         } = self;
         if refs.len() <= sweep::MAX {
             if watch.advance(refs.len()) {
-                sweep::build(input, refs, first, root, nodes, below);
+                sweep::build(input, refs, first, root, nodes, below, leaves);
             }
             return;
         }
@@ -115,6 +120,7 @@ impl<I: Input> Task<'_, I> {
             nodes: left_nodes,
             first,
             below: below_left,
+            leaves,
             watch,
         };
         let right = Task {
@@ -126,6 +132,7 @@ impl<I: Input> Task<'_, I> {
             nodes: right_nodes,
             first: first + mid as u32,
             below: below_right,
+            leaves,
             watch,
         };
         join(worth_it, || left.build(), || right.build());

@@ -46,7 +46,7 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
 
 impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
     /// Follows primitives that have moved: `aabbs` are their boxes now, in the same order as when the hierarchy was
-    /// built. See [`refit`](Bvh::<N, TriangleLeaf, Owned>::refit) of triangles for what that does to the tree.
+    /// built. What that does to the tree is said where triangles are [refitted](crate::layout::Bvh8).
     ///
     /// A box that is [`Aabb::EMPTY`] stands for a primitive that is never hit.
     ///

@@ -380,7 +380,7 @@ fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
 mod tests {
     use super::*;
     use crate::{
-        build::{Builder, binned, input::Boxes, refs::Refs},
+        build::{Builder, binned, input::Boxes, refs::Refs, sweep::Leaves},
         geometry::Aabb,
     };
 
@@ -399,7 +399,12 @@ mod tests {
     fn binned(boxes: &[Aabb]) -> BinaryTree {
         let input = Boxes(boxes);
         let watch = Watch::none();
-        binned::build(&input, Refs::gather(&input, false, &watch).unwrap(), &watch)
+        binned::build(
+            &input,
+            Refs::gather(&input, false, &watch).unwrap(),
+            Leaves::SINGLE,
+            &watch,
+        )
     }
 
     fn cost(nodes: &[BinaryNode]) -> f64 {

@@ -15,11 +15,12 @@ use super::{
     binned::{self, bounds_of_centers},
     clip::clip,
     input::Input,
-    lay_out::{Part, lay_out},
+    lay_out::{Part, lay_out, prune},
     monitor::{STRIDE, Watch},
     pieces::{Piece, Pieces},
     refs::{Bounds, Ref, Refs},
     split::Cut,
+    sweep::Leaves,
 };
 use crate::geometry::TriangleMesh;
 use std::{vec, vec::Vec};
@@ -51,6 +52,7 @@ pub(super) fn build<'a, I: Input>(
     input: &'a I,
     refs: Refs,
     fraction: f32,
+    leaves: Leaves,
     watch: &Watch,
 ) -> Result<(BinaryTree, Pieces<'a, I>), BuildError> {
     let count = refs.refs.len();
@@ -60,7 +62,7 @@ pub(super) fn build<'a, I: Input>(
     let mut pieces = Pieces::whole(input);
     if !I::CAN_SPLIT || budget == 0 || count <= LEAST {
         watch.phase(BUILT, count)?;
-        let tree = binned::build(&pieces, refs, watch);
+        let tree = binned::build(&pieces, refs, leaves, watch);
         return Ok((tree, pieces));
     }
     let levels = (count / LEAST).ilog2() as usize + 1;
@@ -75,7 +77,7 @@ pub(super) fn build<'a, I: Input>(
     let root = upper.grow(refs.refs, budget, 0);
     let parts = upper.parts;
     watch.phase(BUILT, parts[root].count)?;
-    Ok((finish(&pieces, root, parts, watch), pieces))
+    Ok((finish(&pieces, root, parts, leaves, watch), pieces))
 }
 
 /// A part of the tree.
@@ -407,6 +409,7 @@ fn finish<I: Input>(
     pieces: &Pieces<I>,
     root: usize,
     mut parts: Vec<Counted>,
+    leaves: Leaves,
     watch: &Watch,
 ) -> BinaryTree {
     // In the order of `lay_out`.
@@ -427,7 +430,8 @@ fn finish<I: Input>(
             }),
         }
     }
-    let build = |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below, watch);
+    let build =
+        |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below, leaves, watch);
     #[cfg(feature = "rayon")]
     let built: Vec<Vec<BinaryNode>> = {
         use rayon::prelude::*;
@@ -447,5 +451,5 @@ fn finish<I: Input>(
         },
         Grown::Rest(_) => Part::Tree(built.next().unwrap_or_default()),
     });
-    BinaryTree::new_unchecked(nodes, order)
+    BinaryTree::new_unchecked(prune(nodes, leaves), order)
 }
