@@ -4,6 +4,7 @@
 //! are built at once, and the tree is the same however many cores there are.
 
 use super::{
+    BuildError,
     binary::{BinaryNode, BinaryTree},
     input::Input,
     lay_out::prune,
@@ -20,15 +21,25 @@ use std::{vec, vec::Vec};
 /// square of the time nor the stack, on which there are 64 levels, another 24 of halves and 63 of sweeps at most.
 const MAX_DEPTH: u32 = 64;
 
-/// The tree over all of `refs`, one primitive a leaf.
-pub(super) fn build<I: Input>(input: &I, refs: Refs, leaves: Leaves, watch: &Watch) -> BinaryTree {
+/// The tree over all of `refs`.
+///
+/// # Errors
+/// The build was cancelled.
+pub(super) fn build<I: Input>(
+    input: &I,
+    refs: Refs,
+    leaves: Leaves,
+    watch: &Watch,
+) -> Result<BinaryTree, BuildError> {
     let mut refs = refs.refs;
     if refs.is_empty() {
-        return BinaryTree::default();
+        return Ok(BinaryTree::default());
     }
-    let nodes = prune(subtree(input, &mut refs, 0, 1, leaves, watch), leaves);
+    let nodes = subtree(input, &mut refs, 0, 1, leaves, watch);
+    watch.check()?;
+    let nodes = prune(nodes, leaves);
     let order = refs.iter().map(Ref::id).collect();
-    BinaryTree::new_unchecked(nodes, order)
+    Ok(BinaryTree::new_unchecked(nodes, order))
 }
 
 /// The nodes of the tree over `refs`, of which there are some, and which are left in its order. Their places in the

@@ -13,6 +13,7 @@ use super::{
     emit::Shape,
     input::Input,
     monitor::{STRIDE, Watch},
+    sweep::Leaves,
 };
 use core::ops::Range;
 use std::{vec, vec::Vec};
@@ -56,8 +57,8 @@ pub(super) struct Collapse<'a, const W: usize> {
 }
 
 impl<'a, const W: usize> Collapse<'a, W> {
-    /// Of a tree in our order, whose leaves all fit.
-    pub fn new<I: Input>(input: &I, tree: &'a BinaryTree, watch: &Watch) -> Self {
+    /// Of a tree in our order, whose leaves all fit, and are as full as they can be where it was built to have such.
+    pub fn new<I: Input>(input: &I, tree: &'a BinaryTree, leaves: Leaves, watch: &Watch) -> Self {
         const { assert!(W >= 2 && W <= MAX_WIDTH) };
         let nodes = tree.nodes();
         let mut entries = vec![Entry::NONE; nodes.len()];
@@ -66,6 +67,7 @@ impl<'a, const W: usize> Collapse<'a, W> {
                 input,
                 nodes,
                 order: tree.order(),
+                tried: leaves.below,
                 measure: Measure::of_bounds(&root.aabb),
             };
             solver.solve_all(&mut entries, watch);
@@ -81,6 +83,7 @@ impl<'a, const W: usize> Collapse<'a, W> {
                 input,
                 nodes,
                 order: &[],
+                tried: f32::MAX,
                 measure: Measure::of_bounds(&root.aabb),
             };
             for node in (0..nodes.len()).rev() {
@@ -152,8 +155,9 @@ impl<const W: usize> Collapse<'_, W> {
 struct Solver<'a, const W: usize, I> {
     input: &'a I,
     nodes: &'a [BinaryNode],
-    /// Of the primitives; nothing, if leaves stay what they are.
     order: &'a [u32],
+    /// Half the area of nodes up to which it is known that there are no more leaves than those that there are.
+    tried: f32,
     measure: Measure,
 }
 
@@ -246,6 +250,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         let first = left.first;
         let count = left.count.saturating_add(right.count);
         let mut fits = left.fits && right.fits && count as usize <= I::MAX_LEAF;
+        fits &= area >= self.tried;
         if fits {
             let places = self.order.get(first as usize..).unwrap_or(&[]);
             let ids = places.get(..count as usize);
@@ -364,7 +369,7 @@ mod tests {
         let input = Boxes(&boxes);
         let tree = Builder::new().build_primitives_binary(&boxes).unwrap();
         let measure = Measure::of_bounds(&tree.nodes()[0].aabb);
-        let collapse = Collapse::<W>::new(&input, &tree, &Watch::none());
+        let collapse = Collapse::<W>::new(&input, &tree, Leaves::SINGLE, &Watch::none());
         let (all, _) = forests::<W>(&tree, &measure, 0);
         let whole = all.iter().filter(|(roots, _)| *roots == 1);
         let least = whole.map(|&(_, cost)| cost).fold(f32::INFINITY, f32::min);

@@ -6,7 +6,7 @@
 use super::{
     BuildError,
     binary::{BinaryNode, BinaryTree},
-    collapse::Collapse,
+    collapse::{Collapse, MAX_WIDTH},
     cost::Measure,
     emit::Shape,
     input::Input,
@@ -176,13 +176,15 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
     const { assert!(I::MAX_LEAF <= MAX_LEAF) };
     let cost = |aabb: &Aabb, len: usize| measure.half_area(aabb) * I::leaf_cost(len);
     let mut len = leaves.len();
+    // Pairs for which there is no room in one leaf.
+    let mut too_many = [[false; MAX_WIDTH]; MAX_WIDTH];
     loop {
         let mut best = 0.0;
         let mut pair = None;
         for second in 1..len {
             for first in 0..second {
                 let (a, b) = (&leaves[first], &leaves[second]);
-                if a.len + b.len > I::MAX_LEAF {
+                if a.len + b.len > I::MAX_LEAF || too_many[second][first] {
                     continue;
                 }
                 let joined = cost(&a.aabb.join(b.aabb), a.len + b.len);
@@ -193,6 +195,8 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
                     if input.fits(joined.ids()) {
                         best = gain;
                         pair = Some((first, second, joined));
+                    } else {
+                        too_many[second][first] = true;
                     }
                 }
             }
@@ -203,5 +207,11 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
         leaves[first] = joined;
         len -= 1;
         leaves[second] = leaves[len];
+        for changed in [first, second] {
+            too_many[changed] = [false; MAX_WIDTH];
+            for others in &mut too_many {
+                others[changed] = false;
+            }
+        }
     }
 }

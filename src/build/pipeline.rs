@@ -70,13 +70,13 @@ pub(super) fn from_refs<N: WideNode, I: Input>(
         }
         Preset::Balanced => {
             let (tree, pieces) = spatial::build(input, refs, splits, Leaves::FULL, watch)?;
-            parts(&pieces, tree, Some(QUICK), watch)
+            parts(&pieces, tree, Leaves::FULL, Some(QUICK), watch)
         }
         Preset::Best => {
             let leaves = Leaves::smaller_than(SMALL, &refs.refs);
             let (tree, pieces) = spatial::build(input, refs, splits, leaves, watch)?;
             let tree = reinsertion::optimize(tree, SINGLE, 0.65, watch)?;
-            parts(&pieces, tree, Some(GROUPED), watch)
+            parts(&pieces, tree, leaves, Some(GROUPED), watch)
         }
     }?;
     let bvh = finish(parts, dropped)?;
@@ -95,7 +95,10 @@ pub(super) fn from_tree<N: WideNode, I: Input>(
     watch: &Watch,
 ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
     let tree = adopt::adopt(input, tree, refs, watch)?;
-    let bvh = finish(parts(input, tree, None, watch)?, refs.dropped)?;
+    let bvh = finish(
+        parts(input, tree, Leaves::SINGLE, None, watch)?,
+        refs.dropped,
+    )?;
     watch.finish()?;
     Ok(bvh)
 }
@@ -110,7 +113,7 @@ pub(super) fn binary<I: Input>(
     watch: &Watch,
 ) -> Result<BinaryTree, BuildError> {
     watch.phase(0.7, refs.refs.len())?;
-    let tree = binned::build(input, refs, Leaves::SINGLE, watch);
+    let tree = binned::build(input, refs, Leaves::SINGLE, watch)?;
     let tree = reinsertion::optimize(tree, SINGLE, 1.0, watch)?;
     watch.finish()?;
     Ok(tree)
@@ -135,23 +138,25 @@ fn finish<N: WideNode, L: Leaf>(
 fn parts<N: WideNode, I: Input>(
     input: &I,
     tree: BinaryTree,
+    leaves: Leaves,
     effort: Option<Effort>,
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
     match N::WIDTH {
-        4 => collapse::<N, I, 4>(input, &tree, effort, watch),
-        _ => collapse::<N, I, 8>(input, &tree, effort, watch),
+        4 => collapse::<N, I, 4>(input, &tree, leaves, effort, watch),
+        _ => collapse::<N, I, 8>(input, &tree, leaves, effort, watch),
     }
 }
 
 fn collapse<N: WideNode, I: Input, const W: usize>(
     input: &I,
     tree: &BinaryTree,
+    leaves: Leaves,
     effort: Option<Effort>,
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
     watch.phase(0.75, tree.nodes().len())?;
-    let shape = Collapse::<W>::new(input, tree, watch);
+    let shape = Collapse::<W>::new(input, tree, leaves, watch);
     watch.phase(0.83, tree.nodes().len())?;
     let mut tree = group(input, tree, &shape, watch)?;
     drop(shape);
@@ -176,7 +181,7 @@ fn emit_best<N: WideNode, I: Input, const W: usize>(
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
     watch.phase(0.93, tree.nodes().len())?;
-    let shape = Collapse::<W>::new(input, tree, watch);
+    let shape = Collapse::<W>::new(input, tree, Leaves::SINGLE, watch);
     watch.phase(1.0, tree.nodes().len())?;
     emit(input, tree, &shape, watch)
 }

@@ -405,6 +405,7 @@ mod tests {
             Leaves::SINGLE,
             &watch,
         )
+        .unwrap()
     }
 
     fn cost(nodes: &[BinaryNode]) -> f64 {

@@ -62,7 +62,7 @@ pub(super) fn build<'a, I: Input>(
     let mut pieces = Pieces::whole(input);
     if !I::CAN_SPLIT || budget == 0 || count <= LEAST {
         watch.phase(BUILT, count)?;
-        let tree = binned::build(&pieces, refs, leaves, watch);
+        let tree = binned::build(&pieces, refs, leaves, watch)?;
         return Ok((tree, pieces));
     }
     let levels = (count / LEAST).ilog2() as usize + 1;
@@ -77,7 +77,8 @@ pub(super) fn build<'a, I: Input>(
     let root = upper.grow(refs.refs, budget, 0);
     let parts = upper.parts;
     watch.phase(BUILT, parts[root].count)?;
-    Ok((finish(&pieces, root, parts, leaves, watch), pieces))
+    let tree = finish(&pieces, root, parts, leaves, watch)?;
+    Ok((tree, pieces))
 }
 
 /// A part of the tree.
@@ -411,7 +412,7 @@ fn finish<I: Input>(
     mut parts: Vec<Counted>,
     leaves: Leaves,
     watch: &Watch,
-) -> BinaryTree {
+) -> Result<BinaryTree, BuildError> {
     // In the order of `lay_out`.
     let mut jobs = Vec::new();
     let mut todo = vec![(root, 0, 1)];
@@ -440,6 +441,7 @@ fn finish<I: Input>(
     #[cfg(not(feature = "rayon"))]
     let built: Vec<Vec<BinaryNode>> = jobs.iter_mut().map(build).collect();
 
+    watch.check()?;
     let order = jobs.iter().flat_map(|job| job.refs.iter().map(Ref::id));
     let order = order.collect();
     let mut built = built.into_iter();
@@ -451,5 +453,5 @@ fn finish<I: Input>(
         },
         Grown::Rest(_) => Part::Tree(built.next().unwrap_or_default()),
     });
-    BinaryTree::new_unchecked(prune(nodes, leaves), order)
+    Ok(BinaryTree::new_unchecked(prune(nodes, leaves), order))
 }
