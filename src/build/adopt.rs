@@ -6,7 +6,9 @@ use super::{
     binned,
     input::Input,
     lay_out::{Part, below_inner, lay_out},
+    monitor::Watch,
     refs::{Ref, Refs},
+    sweep::Leaves,
 };
 use crate::geometry::TriangleMesh;
 use core::ops::ControlFlow;
@@ -22,6 +24,7 @@ pub(super) fn adopt<I: Input>(
     input: &I,
     tree: &BinaryTree,
     refs: &Refs,
+    watch: &Watch,
 ) -> Result<BinaryTree, BuildError> {
     check(input, tree)?;
     let places = Places::new(input.len(), &refs.refs);
@@ -44,7 +47,7 @@ pub(super) fn adopt<I: Input>(
         }
         let leaf = listed(tree, &tree.nodes()[index]);
         let mut kept: Vec<_> = leaf.filter_map(|&id| places.of(&refs.refs, id)).collect();
-        let subtree = binned::subtree(input, &mut kept, order.len(), below);
+        let subtree = binned::subtree(input, &mut kept, order.len(), below, Leaves::SINGLE, watch);
         order.extend(kept.iter().map(Ref::id));
         Part::Tree(subtree)
     });

@@ -4,12 +4,15 @@
 //! are built at once, and the tree is the same however many cores there are.
 
 use super::{
+    BuildError,
     binary::{BinaryNode, BinaryTree},
     input::Input,
+    lay_out::prune,
+    monitor::{STRIDE, Watch},
     parallel::{TASK, join},
     refs::{Bounds, Ref, Refs},
     split::Cut,
-    sweep,
+    sweep::{self, Leaves},
 };
 use bytemuck::Zeroable;
 use std::{vec, vec::Vec};
@@ -18,15 +21,25 @@ use std::{vec, vec::Vec};
 /// square of the time nor the stack, on which there are 64 levels, another 24 of halves and 63 of sweeps at most.
 const MAX_DEPTH: u32 = 64;
 
-/// The tree over all of `refs`, one primitive a leaf.
-pub(super) fn build<I: Input>(input: &I, refs: Refs) -> BinaryTree {
+/// The tree over all of `refs`.
+///
+/// # Errors
+/// The build was cancelled.
+pub(super) fn build<I: Input>(
+    input: &I,
+    refs: Refs,
+    leaves: Leaves,
+    watch: &Watch,
+) -> Result<BinaryTree, BuildError> {
     let mut refs = refs.refs;
     if refs.is_empty() {
-        return BinaryTree::default();
+        return Ok(BinaryTree::default());
     }
-    let nodes = subtree(input, &mut refs, 0, 1);
+    let nodes = subtree(input, &mut refs, 0, 1, leaves, watch);
+    watch.check()?;
+    let nodes = prune(nodes, leaves);
     let order = refs.iter().map(Ref::id).collect();
-    BinaryTree::new_unchecked(nodes, order)
+    Ok(BinaryTree::new_unchecked(nodes, order))
 }
 
 /// The nodes of the tree over `refs`, of which there are some, and which are left in its order. Their places in the
@@ -36,6 +49,8 @@ pub(super) fn subtree<I: Input>(
     refs: &mut [Ref],
     first: usize,
     below: usize,
+    leaves: Leaves,
+    watch: &Watch,
 ) -> Vec<BinaryNode> {
     let centers = bounds_of_centers(refs);
     let mut nodes = vec![BinaryNode::zeroed(); 2 * refs.len() - 1];
@@ -49,6 +64,8 @@ pub(super) fn subtree<I: Input>(
             nodes,
             first: first as u32,
             below: below as u32,
+            leaves,
+            watch,
         }
         .build();
     }
@@ -69,6 +86,8 @@ struct Task<'a, I> {
     first: u32,
     /// The place of `nodes[0]` in the tree.
     below: u32,
+    leaves: Leaves,
+    watch: &'a Watch<'a>,
 }
 
 impl<I: Input> Task<'_, I> {
@@ -82,9 +101,16 @@ impl<I: Input> Task<'_, I> {
             nodes,
             first,
             below,
+            leaves,
+            watch,
         } = self;
         if refs.len() <= sweep::MAX {
-            sweep::build(input, refs, first, root, nodes, below);
+            if watch.advance(refs.len()) {
+                sweep::build(input, refs, first, root, nodes, below, leaves);
+            }
+            return;
+        }
+        if refs.len() > STRIDE && !watch.advance(0) {
             return;
         }
         let (mid, left_centers, right_centers) = split(refs, &centers, depth);
@@ -105,6 +131,8 @@ impl<I: Input> Task<'_, I> {
             nodes: left_nodes,
             first,
             below: below_left,
+            leaves,
+            watch,
         };
         let right = Task {
             input,
@@ -115,6 +143,8 @@ impl<I: Input> Task<'_, I> {
             nodes: right_nodes,
             first: first + mid as u32,
             below: below_right,
+            leaves,
+            watch,
         };
         join(worth_it, || left.build(), || right.build());
         *root = BinaryNode {

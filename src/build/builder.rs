@@ -1,20 +1,15 @@
 //! What a caller builds with.
 
 use super::{
-    BinaryTree, BuildError, adopt,
-    collapse::Collapse,
-    emit::{Parts, emit},
-    group::group,
+    BinaryTree, BuildError, Monitor, Preset,
     input::{Boxes, Input, Triangles},
-    pieces::Pieces,
-    rebalance::rebalance,
+    monitor::{Monitored, Watch},
+    pipeline,
     refs::Refs,
-    reinsertion::{self, Effort},
-    spatial,
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
-    layout::{Bvh, Bvh8, LayoutError, Owned, PrimitiveLeaf, STACK, TriangleLeaf, WideNode},
+    layout::{Bvh, Bvh8, Owned, PrimitiveLeaf, TriangleLeaf, WideNode},
 };
 
 /// Builds hierarchies: a binary tree by the surface area heuristic, its subtrees moved to where they cost
@@ -39,27 +34,67 @@ use crate::{
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Builder {
+pub struct Builder<'m> {
+    preset: Preset,
     drop_non_finite: bool,
     splits: f32,
+    monitored: Monitored<'m>,
 }
 
-impl Default for Builder {
+impl Default for Builder<'_> {
     fn default() -> Self {
-        Self {
-            drop_non_finite: false,
-            splits: SPLITS,
-        }
+        Self::preset(Preset::default())
     }
 }
 
 /// Room enough: game levels and a kitchen use 0.05 to 0.12. With 0.1, a level that uses 0.12 loses half its gain.
 const SPLITS: f32 = 0.3;
 
-impl Builder {
-    /// A builder that refuses primitives that are not finite.
+impl<'m> Builder<'m> {
+    /// A builder of the best hierarchies, which refuses primitives that are not finite.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A builder for what the hierarchy is for, which refuses primitives that are not finite.
+    ///
+    /// Only whole builds differ by it: binary trees, and hierarchies from them, are the same.
+    pub fn preset(preset: Preset) -> Self {
+        Self {
+            preset,
+            drop_non_finite: false,
+            splits: match preset {
+                Preset::Best => SPLITS,
+                Preset::Balanced | Preset::Fast => 0.0,
+            },
+            monitored: Monitored::default(),
+        }
+    }
+
+    /// Has a monitor told how far builds have got, which may stop them.
+    ///
+    /// ```
+    /// use core::{ops::ControlFlow, sync::atomic::{AtomicBool, Ordering}};
+    /// use wide_bvh::{build::{Builder, BuildError}, geometry::TriangleMesh};
+    ///
+    /// let stop = AtomicBool::new(false); // somebody else's
+    /// let monitor = |fraction: f32| match stop.load(Ordering::Relaxed) {
+    ///     true => ControlFlow::Break(()),
+    ///     false => ControlFlow::Continue(println!("{:.0} %", 100.0 * fraction)),
+    /// };
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0f32]];
+    /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// let builder = Builder::new().monitor(&monitor);
+    /// assert!(builder.build(&mesh).is_ok());
+    /// stop.store(true, Ordering::Relaxed);
+    /// assert_eq!(builder.build(&mesh).err(), Some(BuildError::Cancelled));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn monitor(self, monitor: &'m dyn Monitor) -> Self {
+        Self {
+            monitored: Monitored(Some(monitor)),
+            ..self
+        }
     }
 
     /// Whether triangles with a corner that is NaN or infinite, and boxes with such a bound, are left out,
@@ -72,10 +107,10 @@ impl Builder {
     /// How many references to triangles may be added by cutting large triangles in pieces, as a fraction of their
     /// number; 0 or less, or NaN, is none. A triangle in pieces is in more than one leaf.
     ///
-    /// The default is 0.3, of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
+    /// For [`Preset::Best`] it is 0.3, of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
     /// which takes 6 to 15 % more memory, and up to 9 % off the nodes and leaves that a ray meets.
     ///
-    /// Only [`build`](Self::build) and [`build_as`](Self::build_as) cut triangles.
+    /// Only [`build`](Self::build) and [`build_as`](Self::build_as) cut triangles, and none for [`Preset::Fast`].
     pub fn splits(mut self, fraction: f32) -> Self {
         self.splits = fraction;
         self
@@ -120,7 +155,7 @@ impl Builder {
     /// # Errors
     /// As [`build`](Self::build).
     pub fn build_binary(&self, mesh: &TriangleMesh) -> Result<BinaryTree, BuildError> {
-        self.binary(&Triangles(mesh), 0.0).map(|(tree, ..)| tree)
+        self.binary(&Triangles(mesh))
     }
 
     /// The binary tree over a caller's primitives, before it is collapsed: one a leaf.
@@ -128,7 +163,7 @@ impl Builder {
     /// # Errors
     /// As [`build_primitives`](Self::build_primitives).
     pub fn build_primitives_binary(&self, aabbs: &[Aabb]) -> Result<BinaryTree, BuildError> {
-        self.binary(&Boxes(aabbs), 0.0).map(|(tree, ..)| tree)
+        self.binary(&Boxes(aabbs))
     }
 
     /// The hierarchy over a mesh from a binary tree over its triangles, 8 wide.
@@ -178,8 +213,9 @@ impl Builder {
         &self,
         input: &I,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-        let (tree, pieces, dropped) = self.binary(input, self.splits)?;
-        wide(&pieces, tree, dropped, Some(GROUPED))
+        let watch = Watch::new(self.monitored);
+        let refs = Refs::gather(input, self.drop_non_finite, &watch)?;
+        pipeline::from_refs(input, refs, self.preset, self.splits, &watch)
     }
 
     fn wide_from<N: WideNode, I: Input>(
@@ -187,79 +223,14 @@ impl Builder {
         input: &I,
         tree: &BinaryTree,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-        let refs = Refs::gather(input, self.drop_non_finite)?;
-        let pieces = Pieces::whole(input);
-        let tree = adopt::adopt(&pieces, tree, &refs)?;
-        wide(&pieces, tree, refs.dropped, None)
+        let watch = Watch::new(self.monitored);
+        let refs = Refs::gather(input, self.drop_non_finite, &watch)?;
+        pipeline::from_tree(input, &refs, tree, &watch)
     }
 
-    /// The binary tree, what it is over, and how many primitives were left out of it for not being finite.
-    fn binary<'a, I: Input>(
-        &self,
-        input: &'a I,
-        splits: f32,
-    ) -> Result<(BinaryTree, Pieces<'a, I>, usize), BuildError> {
-        let refs = Refs::gather(input, self.drop_non_finite)?;
-        let dropped = refs.dropped;
-        let (tree, pieces) = spatial::build(input, refs, splits);
-        Ok((reinsertion::optimize(tree, SINGLE), pieces, dropped))
+    fn binary<I: Input>(&self, input: &I) -> Result<BinaryTree, BuildError> {
+        let watch = Watch::new(self.monitored);
+        let refs = Refs::gather(input, self.drop_non_finite, &watch)?;
+        pipeline::binary(input, refs, &watch)
     }
-}
-
-/// For a tree of single primitives: what is large finds its place before leaves are made.
-const SINGLE: Effort = Effort {
-    rounds: 20,
-    share: 40,
-    least_gain: 1e-3,
-};
-
-/// For a tree of leaves, of which there are a fourth as many. Together the two take a kitchen from 8.5 to 6.4
-/// nodes a bounce ray, game levels from 8.5, 8.2 and 8.6 to 7.2, 7.8 and 7.5, for as much time again as the
-/// build takes without; more rounds bring 1 % more at most. A scan gains 1 % and is done after a few.
-const GROUPED: Effort = Effort {
-    rounds: 40,
-    share: 3,
-    least_gain: 1e-3,
-};
-
-/// The hierarchy from a tree in our order.
-fn wide<N: WideNode, I: Input>(
-    input: &I,
-    tree: BinaryTree,
-    dropped: usize,
-    effort: Option<Effort>,
-) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-    let Parts {
-        nodes,
-        leaves,
-        primitives,
-        bounds,
-    } = match N::WIDTH {
-        4 => collapse::<N, I, 4>(input, &tree, effort),
-        _ => collapse::<N, I, 8>(input, &tree, effort),
-    }?;
-    let bvh = Bvh::from_parts(nodes, leaves, primitives, bounds)?;
-    Ok(bvh.with_dropped(dropped as u32))
-}
-
-fn collapse<N: WideNode, I: Input, const W: usize>(
-    input: &I,
-    tree: &BinaryTree,
-    effort: Option<Effort>,
-) -> Result<Parts<N, I::Leaf>, LayoutError> {
-    let mut tree = group(input, tree, &Collapse::<W>::new(input, tree));
-    if let Some(effort) = effort {
-        tree = reinsertion::optimize(tree, effort);
-    }
-    let parts = emit(input, &tree, &Collapse::<W>::new(input, &tree));
-    let Err(LayoutError::TooDeep(_)) = parts else {
-        return parts;
-    };
-    // A wide node takes up a binary level at least and leaves W - 1 children behind at most. So a tree
-    // of no more levels than this fits the stack, however it is collapsed; and it has room for halving
-    // 2^30 leaves, whatever the width.
-    const { assert!((STACK - 1) / (W - 1) >= 30) };
-    let levels = ((STACK - 1) / (W - 1)) as u32;
-    tree = rebalance(&tree, levels);
-    emit(input, &tree, &Collapse::<W>::new(input, &tree))
 }

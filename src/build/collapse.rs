@@ -10,10 +10,14 @@
 use super::{
     binary::{BinaryNode, BinaryTree},
     cost::{self, Measure},
+    emit::Shape,
     input::Input,
+    monitor::{STRIDE, Watch},
+    sweep::Leaves,
 };
 use core::ops::Range;
 use std::{vec, vec::Vec};
+use wide::f32x4;
 
 /// The widest node there is.
 pub(super) const MAX_WIDTH: usize = 8;
@@ -24,8 +28,8 @@ const TASK_NODES: usize = 1 << 14;
 /// What is known of a binary node.
 #[derive(Clone, Copy)]
 struct Entry {
-    /// C(n, 1) to C(n, 7).
-    forest: [f32; MAX_WIDTH - 1],
+    /// C(n, 1) to C(n, W).
+    forest: [f32; MAX_WIDTH],
     /// Where its primitives begin in the tree's order.
     first: u32,
     /// How many primitives it has, or 255 if more.
@@ -48,36 +52,65 @@ impl Entry {
 
 /// The cheapest collapse of a tree to nodes `W` wide.
 pub(super) struct Collapse<'a, const W: usize> {
-    tree: &'a BinaryTree,
+    nodes: &'a [BinaryNode],
     entries: Vec<Entry>,
 }
 
 impl<'a, const W: usize> Collapse<'a, W> {
-    /// Of a tree in our order, whose leaves all fit.
-    pub fn new<I: Input>(input: &I, tree: &'a BinaryTree) -> Self {
+    /// Of a tree in our order, whose leaves all fit, and are as full as they can be where it was built to have such.
+    pub fn new<I: Input>(input: &I, tree: &'a BinaryTree, leaves: Leaves, watch: &Watch) -> Self {
         const { assert!(W >= 2 && W <= MAX_WIDTH) };
         let nodes = tree.nodes();
         let mut entries = vec![Entry::NONE; nodes.len()];
         if let Some(root) = nodes.first() {
             let solver = Solver::<W, I> {
                 input,
-                tree,
+                nodes,
+                order: tree.order(),
+                tried: leaves.below,
                 measure: Measure::of_bounds(&root.aabb),
             };
-            solver.solve_all(&mut entries);
+            solver.solve_all(&mut entries, watch);
         }
-        Self { tree, entries }
+        Self { nodes, entries }
     }
 
-    /// The primitives of a node that is to be a leaf, as a range of the tree's order.
-    pub fn leaf(&self, node: usize) -> Option<Range<usize>> {
+    /// Of a tree whose children come after their parents, and whose leaves stay what they are.
+    pub fn of_leaves<I: Input>(input: &I, nodes: &'a [BinaryNode], watch: &Watch) -> Self {
+        let mut entries = vec![Entry::NONE; nodes.len()];
+        if let Some(root) = nodes.first() {
+            let solver = Solver::<W, I> {
+                input,
+                nodes,
+                order: &[],
+                tried: f32::MAX,
+                measure: Measure::of_bounds(&root.aabb),
+            };
+            for node in (0..nodes.len()).rev() {
+                entries[node] = solver.solve(node, &entries, 0);
+                if node % STRIDE == 0 {
+                    watch.advance(STRIDE);
+                }
+            }
+        }
+        Self { nodes, entries }
+    }
+
+    /// The primitives of a node that becomes a leaf, as a range of the tree's order.
+    pub fn places(&self, node: usize) -> Range<usize> {
         let entry = &self.entries[node];
         let first = entry.first as usize;
-        entry.is_leaf.then(|| first..first + entry.count as usize)
+        first..first + entry.count as usize
+    }
+}
+
+impl<const W: usize> Shape<W> for Collapse<'_, W> {
+    fn is_leaf(&self, node: usize) -> bool {
+        self.entries[node].is_leaf
     }
 
-    /// The children of a wide node: the places of binary ones, in the binary tree's order, and how many.
-    pub fn children(&self, node: usize) -> ([usize; W], usize) {
+    /// In the binary tree's order.
+    fn children(&self, node: usize) -> ([usize; W], usize) {
         let (mut children, mut count) = ([0; W], 0);
         // Forests still to be taken apart, and how many roots each may have: never more than W in all.
         let mut todo = [(0, 0); W];
@@ -99,10 +132,12 @@ impl<'a, const W: usize> Collapse<'a, W> {
         }
         (children, count)
     }
+}
 
+impl<const W: usize> Collapse<'_, W> {
     /// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
     fn cut(&self, node: usize, roots: usize, out: &mut [(usize, usize)]) -> usize {
-        let [left, right] = self.tree.nodes()[node].children();
+        let [left, right] = self.nodes[node].children();
         let cost =
             |k: usize| self.entries[left].forest[k - 1] + self.entries[right].forest[roots - k - 1];
         let mut best = 1;
@@ -119,14 +154,17 @@ impl<'a, const W: usize> Collapse<'a, W> {
 
 struct Solver<'a, const W: usize, I> {
     input: &'a I,
-    tree: &'a BinaryTree,
+    nodes: &'a [BinaryNode],
+    order: &'a [u32],
+    /// Half the area of nodes up to which it is known that there are no more leaves than those that there are.
+    tried: f32,
     measure: Measure,
 }
 
 impl<const W: usize, I: Input> Solver<'_, W, I> {
     /// Every node after those below it, without recursion: the ranges below small subtrees first, at
     /// once, then what is above.
-    fn solve_all(&self, entries: &mut [Entry]) {
+    fn solve_all(&self, entries: &mut [Entry], watch: &Watch) {
         let tasks = self.tasks();
         let mut slices = Vec::with_capacity(tasks.len());
         let (mut rest, mut passed) = (&mut *entries, 0);
@@ -138,6 +176,9 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         let solve = |(start, slice): (usize, &mut [Entry])| {
             for node in (0..slice.len()).rev() {
                 slice[node] = self.solve(start + node, slice, start);
+                if node % STRIDE == 0 {
+                    watch.advance(STRIDE);
+                }
             }
         };
         #[cfg(feature = "rayon")]
@@ -162,7 +203,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
 
     /// What is below the largest subtrees of up to [`TASK_NODES`] nodes, as ranges from left to right.
     fn tasks(&self) -> Vec<Range<usize>> {
-        let nodes = self.tree.nodes();
+        let nodes = self.nodes;
         let mut tasks = Vec::new();
         // A node, and where the range of the nodes below it ends.
         let mut todo = vec![(0, nodes.len())];
@@ -188,9 +229,9 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
     /// One node; those below it are in `entries`, of which the first is that of node `start`.
     #[inline(always)]
     fn solve(&self, node: usize, entries: &[Entry], start: usize) -> Entry {
-        let BinaryNode { aabb, first, count } = self.tree.nodes()[node];
+        let BinaryNode { aabb, first, count } = self.nodes[node];
         let area = self.measure.half_area(&aabb);
-        if self.tree.nodes()[node].is_leaf() {
+        if self.nodes[node].is_leaf() {
             return Entry {
                 forest: [area * I::leaf_cost(count as usize); _],
                 first,
@@ -200,28 +241,20 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             };
         }
 
-        let [left, right] = self.tree.nodes()[node].children();
+        let [left, right] = self.nodes[node].children();
         let (left, right) = (&entries[left - start], &entries[right - start]);
-        // `forest[i - 1]` is C(n, i), of i > 1 roots exactly.
-        let mut forest = [f32::INFINITY; MAX_WIDTH];
-        for k in 1..W {
-            for i in k + 1..=W {
-                let cost = left.forest[k - 1] + right.forest[i - k - 1];
-                if cost < forest[i - 1] {
-                    forest[i - 1] = cost;
-                }
-            }
-        }
+        let mut forest = Self::forest(&left.forest, &right.forest);
+        // The least of W roots, under one node.
         forest[0] = forest[W - 1] + area * cost::NODE;
 
         let first = left.first;
         let count = left.count.saturating_add(right.count);
         let mut fits = left.fits && right.fits && count as usize <= I::MAX_LEAF;
+        fits &= area >= self.tried;
         if fits {
-            let first = first as usize;
-            fits = self
-                .input
-                .fits(&self.tree.order()[first..first + count as usize]);
+            let places = self.order.get(first as usize..).unwrap_or(&[]);
+            let ids = places.get(..count as usize);
+            fits = ids.is_some_and(|ids| self.input.fits(ids));
         }
         let mut is_leaf = false;
         if fits {
@@ -232,9 +265,10 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             }
         }
         for i in 1..W {
-            forest[i] = forest[i].min(forest[i - 1]);
+            if forest[i - 1] < forest[i] {
+                forest[i] = forest[i - 1];
+            }
         }
-        let [forest @ .., _] = forest;
         Entry {
             forest,
             first,
@@ -242,6 +276,28 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             fits,
             is_leaf,
         }
+    }
+
+    /// C(left, k) + C(right, i - k), the least over k, for all i from 2 on; in the first place is nothing.
+    #[inline(always)]
+    fn forest(left: &[f32; MAX_WIDTH], right: &[f32; MAX_WIDTH]) -> [f32; MAX_WIDTH] {
+        // Row k is `right` after k places that are never the least.
+        let mut shifted = [f32::INFINITY; 2 * MAX_WIDTH];
+        shifted[MAX_WIDTH..].copy_from_slice(right);
+        let row = |k: usize| {
+            let at = |lane: usize| shifted[MAX_WIDTH - k + lane];
+            let low = f32x4::new([at(0), at(1), at(2), at(3)]);
+            (low, f32x4::new([at(4), at(5), at(6), at(7)]))
+        };
+        let mut least = [f32x4::splat(f32::INFINITY); 2];
+        for (k, &left) in (1..W).zip(left) {
+            let (low, high) = row(k);
+            let left = f32x4::splat(left);
+            least[0] = least[0].fast_min(low + left);
+            least[1] = least[1].fast_min(high + left);
+        }
+        let [[a, b, c, d], [e, f, g, h]] = [least[0].to_array(), least[1].to_array()];
+        [a, b, c, d, e, f, g, h]
     }
 }
 
@@ -296,9 +352,9 @@ mod tests {
 
     /// What the wide nodes and leaves below a node cost.
     fn cost_of<const W: usize>(collapse: &Collapse<W>, measure: &Measure, node: usize) -> f32 {
-        let area = measure.half_area(&collapse.tree.nodes()[node].aabb);
-        if let Some(leaf) = collapse.leaf(node) {
-            return area * Boxes::leaf_cost(leaf.len());
+        let area = measure.half_area(&collapse.nodes[node].aabb);
+        if collapse.is_leaf(node) {
+            return area * Boxes::leaf_cost(collapse.places(node).len());
         }
         let (children, count) = collapse.children(node);
         assert!((2..=W).contains(&count));
@@ -313,7 +369,7 @@ mod tests {
         let input = Boxes(&boxes);
         let tree = Builder::new().build_primitives_binary(&boxes).unwrap();
         let measure = Measure::of_bounds(&tree.nodes()[0].aabb);
-        let collapse = Collapse::<W>::new(&input, &tree);
+        let collapse = Collapse::<W>::new(&input, &tree, Leaves::SINGLE, &Watch::none());
         let (all, _) = forests::<W>(&tree, &measure, 0);
         let whole = all.iter().filter(|(roots, _)| *roots == 1);
         let least = whole.map(|&(_, cost)| cost).fold(f32::INFINITY, f32::min);

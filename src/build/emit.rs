@@ -1,6 +1,13 @@
 //! From the collapsed binary tree to the parts of a hierarchy, in the layout's order.
 
-use super::{binary::BinaryTree, collapse::Collapse, cost::Measure, input::Input};
+use super::{
+    BuildError,
+    binary::{BinaryNode, BinaryTree},
+    collapse::Collapse,
+    cost::Measure,
+    input::Input,
+    monitor::Watch,
+};
 use crate::{
     geometry::Aabb,
     layout::{Child, LayoutError, STACK, WideNode},
@@ -16,61 +23,32 @@ pub(super) struct Parts<N, L> {
     pub bounds: Aabb,
 }
 
+/// What a binary tree is collapsed to.
+pub(super) trait Shape<const W: usize> {
+    /// Whether a node becomes a leaf.
+    fn is_leaf(&self, node: usize) -> bool;
+    /// The children of a node that becomes a wide one, and how many.
+    fn children(&self, node: usize) -> ([usize; W], usize);
+}
+
 /// Emits a tree as it was collapsed.
 ///
 /// # Errors
-/// The first node to which a walk would need more than its stack.
+/// The first node to which a walk would need more than its stack; or the build was cancelled.
 pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     input: &I,
     tree: &BinaryTree,
     collapse: &Collapse<W>,
-) -> Result<Parts<N, I::Leaf>, LayoutError> {
+    watch: &Watch,
+) -> Result<Parts<N, I::Leaf>, BuildError> {
+    let (nodes, leaves) = walk(tree.nodes(), collapse, watch)?;
+    let ranges: Vec<_> = leaves
+        .into_iter()
+        .map(|leaf| collapse.places(leaf))
+        .collect();
+    let (leaves, primitives) = fill(input, tree.order(), &ranges, watch)?;
+    watch.check()?;
     let bounds = tree.nodes().first().map_or(Aabb::EMPTY, |root| root.aabb);
-    let measure = Measure::of_bounds(&bounds);
-    let area = |node: usize| measure.half_area(&tree.nodes()[node].aabb);
-    let mut nodes = Vec::new();
-    let mut leaves = Vec::new();
-    // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
-    let mut todo = Vec::new();
-    if !tree.nodes().is_empty() {
-        match collapse.leaf(0) {
-            Some(leaf) => leaves.push(leaf),
-            None => {
-                nodes.push(N::zeroed());
-                todo.push((0, 0, 0));
-            }
-        }
-    }
-    while let Some((node, place, used)) = todo.pop() {
-        let (mut children, count) = collapse.children(node);
-        let children = &mut children[..count];
-        let used = used + count - 1;
-        if used >= STACK {
-            return Err(LayoutError::TooDeep(place));
-        }
-        // The likeliest first: its nodes follow, close by.
-        children.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
-        let (known, first) = (todo.len(), nodes.len());
-        let lanes = children.iter().map(|&child| {
-            let link = match collapse.leaf(child) {
-                Some(leaf) => {
-                    leaves.push(leaf);
-                    Child::leaf(leaves.len() as u32 - 1)
-                }
-                None => {
-                    let place = first + todo.len() - known;
-                    todo.push((child, place, used));
-                    Child::node(place as u32)
-                }
-            };
-            (tree.nodes()[child].aabb, link)
-        });
-        let wide = N::from_children(lanes);
-        nodes[place] = wide;
-        nodes.resize(first + todo.len() - known, N::zeroed());
-        todo[known..].reverse();
-    }
-    let (leaves, primitives) = fill(input, tree.order(), &leaves)?;
     Ok(Parts {
         nodes,
         leaves,
@@ -79,11 +57,75 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     })
 }
 
+/// The wide nodes, and the binary ones that become leaves, both in the layout's order.
+///
+/// # Errors
+/// As [`emit`].
+pub(super) fn walk<N: WideNode, const W: usize>(
+    binary: &[BinaryNode],
+    shape: &impl Shape<W>,
+    watch: &Watch,
+) -> Result<(Vec<N>, Vec<usize>), BuildError> {
+    let mut nodes = Vec::new();
+    let mut leaves = Vec::new();
+    let Some(root) = binary.first() else {
+        return Ok((nodes, leaves));
+    };
+    let measure = Measure::of_bounds(&root.aabb);
+    // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
+    let mut todo = Vec::new();
+    if shape.is_leaf(0) {
+        leaves.push(0);
+    } else {
+        nodes.push(N::zeroed());
+        todo.push((0, 0, 0));
+    }
+    while let Some((node, place, used)) = todo.pop() {
+        let (children, count) = shape.children(node);
+        let used = used + count - 1;
+        if used >= STACK {
+            return Err(LayoutError::TooDeep(place).into());
+        }
+        // The likeliest first: its nodes follow, close by.
+        let mut lanes = [(0.0, 0); W];
+        for (lane, &child) in children[..count].iter().enumerate() {
+            let area = measure.half_area(&binary[child].aabb);
+            // By insertion: there are few, and equals stay in order.
+            let mut place = lane;
+            while place > 0 && lanes[place - 1].0 < area {
+                lanes[place] = lanes[place - 1];
+                place -= 1;
+            }
+            lanes[place] = (area, child);
+        }
+        let (known, first) = (todo.len(), nodes.len());
+        let lanes = lanes[..count].iter().map(|&(_, child)| {
+            let link = if shape.is_leaf(child) {
+                leaves.push(child);
+                Child::leaf(leaves.len() as u32 - 1)
+            } else {
+                let place = first + todo.len() - known;
+                todo.push((child, place, used));
+                Child::node(place as u32)
+            };
+            (binary[child].aabb, link)
+        });
+        nodes[place] = N::from_children(lanes);
+        nodes.resize(first + todo.len() - known, N::zeroed());
+        todo[known..].reverse();
+        if !watch.advance(count) {
+            return Err(BuildError::Cancelled);
+        }
+    }
+    Ok((nodes, leaves))
+}
+
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.
 fn fill<I: Input>(
     input: &I,
     order: &[u32],
     ranges: &[Range<usize>],
+    watch: &Watch,
 ) -> Result<(Vec<I::Leaf>, Vec<u32>), LayoutError> {
     let mut primitives = Vec::with_capacity(order.len());
     let mut ends = Vec::with_capacity(ranges.len() + 1);
@@ -104,7 +146,11 @@ fn fill<I: Input>(
         ends.push(primitives.len());
     }
     let leaf = |(index, ends): (usize, &[usize])| {
-        let leaf = input.leaf(&primitives[ends[0]..ends[1]], ends[0] as u32);
+        watch.advance(1);
+        let mut filling = I::EMPTY;
+        let mut ids = primitives[ends[0]..ends[1]].iter();
+        let fits = ids.all(|&id| input.add(&mut filling, id));
+        let leaf = I::leaf(&filling, ends[0] as u32).filter(|_| fits);
         leaf.ok_or(LayoutError::Leaf(index))
     };
     #[cfg(feature = "rayon")]

@@ -47,8 +47,80 @@ pub enum BuildError {
         /// How many primitives there are.
         primitives: usize,
     },
+    /// The [`Monitor`](super::Monitor) said to stop.
+    Cancelled,
     /// The parts did not pass the layout's check. A bug in the builder, should it ever be seen.
     Layout(LayoutError),
+}
+
+/// Why a hierarchy could not follow what moved; names the first offender.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RefitError {
+    /// A primitive that is in the hierarchy is not there any more.
+    PrimitiveGone {
+        /// The primitive.
+        primitive: usize,
+    },
+    /// A primitive that is not in the hierarchy, for having been left out or not there, can be hit now.
+    PrimitiveLeftOut {
+        /// The primitive.
+        primitive: usize,
+    },
+    /// Corners of triangles that were at one place are not any more, and their leaf has no room for so many.
+    VerticesParted {
+        /// The first triangle for which there is no room.
+        primitive: usize,
+    },
+    /// What no hierarchy can be built of.
+    Primitive {
+        /// The primitive.
+        primitive: usize,
+        /// What is wrong with it.
+        error: BuildError,
+    },
+}
+
+impl RefitError {
+    /// The primitive that it is about.
+    pub fn primitive(&self) -> usize {
+        match *self {
+            Self::PrimitiveGone { primitive }
+            | Self::PrimitiveLeftOut { primitive }
+            | Self::VerticesParted { primitive }
+            | Self::Primitive { primitive, .. } => primitive,
+        }
+    }
+}
+
+impl fmt::Display for RefitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::PrimitiveGone { primitive } => {
+                write!(f, "primitive {primitive} is not there any more")
+            }
+            Self::PrimitiveLeftOut { primitive } => {
+                write!(
+                    f,
+                    "primitive {primitive} can be hit now, and is not in the hierarchy"
+                )
+            }
+            Self::VerticesParted { primitive } => write!(
+                f,
+                "triangle {primitive}: vertices that were one are not, and its leaf has no room for them"
+            ),
+            Self::Primitive { error, .. } => error.fmt(f),
+        }
+    }
+}
+
+impl Error for RefitError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Primitive { error, .. } => Some(error),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for BuildError {
@@ -81,6 +153,7 @@ impl fmt::Display for BuildError {
                 f,
                 "place {place} of the tree's order: primitive {primitive} is past the {primitives} there are"
             ),
+            Self::Cancelled => write!(f, "the build was cancelled"),
             Self::Layout(error) => write!(f, "the hierarchy built is not sound: {error}"),
         }
     }

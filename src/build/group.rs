@@ -4,11 +4,14 @@
 //! are then each half full, and close by.
 
 use super::{
+    BuildError,
     binary::{BinaryNode, BinaryTree},
-    collapse::Collapse,
+    collapse::{Collapse, MAX_WIDTH},
     cost::Measure,
+    emit::Shape,
     input::Input,
     lay_out::{Part, below_inner, lay_out},
+    monitor::Watch,
 };
 use crate::geometry::Aabb;
 use core::ops::ControlFlow;
@@ -68,15 +71,26 @@ impl Group {
 }
 
 /// The tree whose leaves are those that it is collapsed to, joined.
+///
+/// # Errors
+/// The build was cancelled.
 pub(super) fn group<I: Input, const W: usize>(
     input: &I,
     tree: &BinaryTree,
     collapse: &Collapse<W>,
-) -> BinaryTree {
+    watch: &Watch,
+) -> Result<BinaryTree, BuildError> {
     let Some(root) = tree.nodes().first() else {
-        return BinaryTree::default();
+        return Ok(BinaryTree::default());
     };
-    let groups = groups(input, tree, collapse, &Measure::of_bounds(&root.aabb));
+    let groups = groups(
+        input,
+        tree,
+        collapse,
+        &Measure::of_bounds(&root.aabb),
+        watch,
+    );
+    watch.check()?;
 
     // The group that a node has become, and how many there are below a node. Below a group there is none.
     const NONE: u32 = u32::MAX;
@@ -112,7 +126,7 @@ pub(super) fn group<I: Input, const W: usize>(
             }
         }
     });
-    BinaryTree::new_unchecked(nodes, order)
+    Ok(BinaryTree::new_unchecked(nodes, order))
 }
 
 /// The leaves of every wide node, joined.
@@ -121,10 +135,14 @@ fn groups<I: Input, const W: usize>(
     tree: &BinaryTree,
     collapse: &Collapse<W>,
     measure: &Measure,
+    watch: &Watch,
 ) -> Vec<Group> {
     let mut groups = Vec::new();
     let leaf = |node: usize| {
-        let numbers = &tree.order()[collapse.leaf(node)?];
+        if !collapse.is_leaf(node) {
+            return None;
+        }
+        let numbers = &tree.order()[collapse.places(node)];
         let primitives = numbers.iter().map(|&number| input.primitive(number));
         Some(Group::new(node, tree.nodes()[node].aabb, primitives))
     };
@@ -134,6 +152,9 @@ fn groups<I: Input, const W: usize>(
         None => todo.push(0),
     }
     while let Some(node) = todo.pop() {
+        if !watch.advance(W) {
+            break;
+        }
         let (children, count) = collapse.children(node);
         let (mut leaves, mut len) = ([Group::NONE; W], 0);
         for &child in &children[..count] {
@@ -155,13 +176,15 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
     const { assert!(I::MAX_LEAF <= MAX_LEAF) };
     let cost = |aabb: &Aabb, len: usize| measure.half_area(aabb) * I::leaf_cost(len);
     let mut len = leaves.len();
+    // Pairs for which there is no room in one leaf.
+    let mut too_many = [[false; MAX_WIDTH]; MAX_WIDTH];
     loop {
         let mut best = 0.0;
         let mut pair = None;
         for second in 1..len {
             for first in 0..second {
                 let (a, b) = (&leaves[first], &leaves[second]);
-                if a.len + b.len > I::MAX_LEAF {
+                if a.len + b.len > I::MAX_LEAF || too_many[second][first] {
                     continue;
                 }
                 let joined = cost(&a.aabb.join(b.aabb), a.len + b.len);
@@ -172,6 +195,8 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
                     if input.fits(joined.ids()) {
                         best = gain;
                         pair = Some((first, second, joined));
+                    } else {
+                        too_many[second][first] = true;
                     }
                 }
             }
@@ -182,5 +207,11 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
         leaves[first] = joined;
         len -= 1;
         leaves[second] = leaves[len];
+        for changed in [first, second] {
+            too_many[changed] = [false; MAX_WIDTH];
+            for others in &mut too_many {
+                others[changed] = false;
+            }
+        }
     }
 }

@@ -1,12 +1,12 @@
 //! What trees are built over: the triangles of a mesh, or a caller's boxes. All that differs between
 //! the two is here.
 
-use super::{BuildError, cost};
+use super::{BuildError, cost, fill::Filling};
 use crate::{
     geometry::{Aabb, TriangleMesh, is_degenerate},
     layout::{Leaf, PrimitiveLeaf, TriangleLeaf},
 };
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// Whether a primitive has a place in the tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +24,10 @@ pub(super) enum Verdict {
 /// Primitives, by number, and the leaves they go into.
 pub(super) trait Input: Sync {
     type Leaf: Leaf + Send;
+    /// A leaf while it is filled.
+    type Filling: Copy + Send;
+    /// One without primitives.
+    const EMPTY: Self::Filling;
     /// The most primitives a leaf has.
     const MAX_LEAF: usize;
     /// How many times the cost of two leaves one may have for which they are given up.
@@ -41,12 +45,22 @@ pub(super) trait Input: Sync {
     fn triangle(&self, id: u32) -> Option<[Vec3; 3]>;
     /// The primitive that a number in a tree stands for.
     fn primitive(&self, number: u32) -> u32;
-    /// Whether these primitives, no more than [`Input::MAX_LEAF`], can be one leaf.
-    fn fits(&self, ids: &[u32]) -> bool;
+    /// Empties a leaf.
+    fn clear(filling: &mut Self::Filling);
+    /// Adds a primitive to a leaf, if it fits.
+    fn add(&self, filling: &mut Self::Filling, id: u32) -> bool;
+    /// Whether these primitives can be one leaf.
+    #[inline]
+    fn fits(&self, ids: &[u32]) -> bool {
+        let mut filling = Self::EMPTY;
+        ids.iter().all(|&id| self.add(&mut filling, id))
+    }
     /// The cost of a leaf of `count`.
     fn leaf_cost(count: usize) -> f32;
-    /// The leaf of these primitives, which do fit, their numbers beginning at `first` in the list.
-    fn leaf(&self, ids: &[u32], first: u32) -> Option<Self::Leaf>;
+    /// The box around the primitives of a leaf, of which there are some.
+    fn aabb_of(filling: &Self::Filling) -> Aabb;
+    /// The leaf, unless it is empty, of the primitives whose numbers begin at `first` in the list.
+    fn leaf(filling: &Self::Filling, first: u32) -> Option<Self::Leaf>;
 }
 
 /// The triangles of a mesh.
@@ -67,12 +81,16 @@ impl Triangles<'_> {
 
 /// The box around a triangle. The sum turns -0.0 into 0.0, so that the order of joins never shows.
 #[inline(always)]
-fn triangle_aabb([a, b, c]: [Vec3; 3]) -> Aabb {
-    Aabb::new(a.min(b).min(c) + 0.0, a.max(b).max(c) + 0.0)
+fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
+    let [a, b, c] = corners.map(Vec3A::from);
+    let (min, max) = (a.min(b).min(c) + 0.0, a.max(b).max(c) + 0.0);
+    Aabb::new(min.into(), max.into())
 }
 
 impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
+    type Filling = Filling;
+    const EMPTY: Filling = Filling::EMPTY;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
     const JOINED: f32 = cost::TRIANGLES_JOINED;
     const CAN_SPLIT: bool = true;
@@ -84,7 +102,9 @@ impl Input for Triangles<'_> {
     #[inline]
     fn verdict(&self, id: u32) -> Verdict {
         let corners = self.corners(id);
-        if let Some(corner) = corners.iter().position(|corner| !corner.is_finite()) {
+        let [a, b, c] = corners.map(Vec3A::from);
+        let is_finite = a.is_finite() && b.is_finite() && c.is_finite();
+        if !is_finite && let Some(corner) = corners.iter().position(|corner| !corner.is_finite()) {
             return Verdict::NonFinite(BuildError::NonFinitePosition {
                 triangle: id as usize,
                 corner,
@@ -113,43 +133,14 @@ impl Input for Triangles<'_> {
         number
     }
 
-    /// Few enough distinct positions. Most repeats are seen by number.
-    fn fits(&self, ids: &[u32]) -> bool {
-        const MOST: usize = TriangleLeaf::MAX_VERTICES;
-        // Vertices past the last are a number that none has, and NaN, which nothing equals: so whole
-        // arrays are compared, in vectors.
-        const NONE: u32 = u32::MAX;
-        let mut vertices = [NONE; MOST];
-        let mut positions = [[f32::NAN; MOST]; 3];
-        let mut count = 0;
-        for &id in ids {
-            for vertex in self.0.indices()[id as usize] {
-                if vertex != NONE
-                    && vertices
-                        .iter()
-                        .fold(false, |known, &v| known | (v == vertex))
-                {
-                    continue;
-                }
-                let [x, y, z] = self.0.positions()[vertex as usize];
-                let [xs, ys, zs] = &positions;
-                let known = (0..MOST).fold(false, |known, i| {
-                    known | ((xs[i] == x) & (ys[i] == y) & (zs[i] == z))
-                });
-                if known {
-                    continue;
-                }
-                if count == MOST || vertex == NONE {
-                    return false;
-                }
-                vertices[count] = vertex;
-                for (axis, x) in [x, y, z].into_iter().enumerate() {
-                    positions[axis][count] = x;
-                }
-                count += 1;
-            }
-        }
-        true
+    #[inline(always)]
+    fn clear(filling: &mut Filling) {
+        filling.clear();
+    }
+
+    #[inline(always)]
+    fn add(&self, filling: &mut Filling, id: u32) -> bool {
+        filling.add(self.0, id)
     }
 
     #[inline]
@@ -157,13 +148,14 @@ impl Input for Triangles<'_> {
         cost::TRIANGLE_LEAF + cost::TRIANGLE * count as f32
     }
 
-    fn leaf(&self, ids: &[u32], first: u32) -> Option<TriangleLeaf> {
-        let mut triangles = [[Vec3::ZERO; 3]; TriangleLeaf::MAX_TRIANGLES];
-        let triangles = triangles.get_mut(..ids.len())?;
-        for (triangle, &id) in triangles.iter_mut().zip(ids) {
-            *triangle = self.corners(id);
-        }
-        TriangleLeaf::new(triangles, first)
+    #[inline(always)]
+    fn aabb_of(filling: &Filling) -> Aabb {
+        filling.aabb()
+    }
+
+    #[inline(always)]
+    fn leaf(filling: &Filling, first: u32) -> Option<TriangleLeaf> {
+        filling.leaf(first)
     }
 }
 
@@ -173,6 +165,9 @@ pub(super) struct Boxes<'a>(pub &'a [Aabb]);
 
 impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
+    /// How many there are, and the box around them.
+    type Filling = (usize, Aabb);
+    const EMPTY: Self::Filling = (0, Aabb::EMPTY);
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
     const JOINED: f32 = 1.0;
     const CAN_SPLIT: bool = false;
@@ -208,8 +203,23 @@ impl Input for Boxes<'_> {
         number
     }
 
-    fn fits(&self, _: &[u32]) -> bool {
-        true
+    #[inline]
+    fn clear(filling: &mut Self::Filling) {
+        *filling = Self::EMPTY;
+    }
+
+    #[inline]
+    fn add(&self, (count, aabb): &mut Self::Filling, id: u32) -> bool {
+        let fits = *count < Self::MAX_LEAF;
+        if fits {
+            *count += 1;
+            *aabb = aabb.join(self.aabb(id));
+        }
+        fits
+    }
+
+    fn aabb_of(&(_, aabb): &Self::Filling) -> Aabb {
+        aabb
     }
 
     #[inline]
@@ -217,7 +227,7 @@ impl Input for Boxes<'_> {
         cost::PRIMITIVE_LEAF + cost::PRIMITIVE * count as f32
     }
 
-    fn leaf(&self, ids: &[u32], first: u32) -> Option<PrimitiveLeaf> {
-        Some(PrimitiveLeaf::new(first, ids.len() as u32))
+    fn leaf(&(count, _): &Self::Filling, first: u32) -> Option<PrimitiveLeaf> {
+        (count > 0).then(|| PrimitiveLeaf::new(first, count as u32))
     }
 }

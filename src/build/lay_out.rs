@@ -4,11 +4,40 @@
 //! node comes before those below it; what is below it is one range; and the leaves, from left to right, have
 //! the tree's order of primitives from its beginning to its end.
 
-use super::binary::{BinaryNode, BinaryTree};
+use super::{
+    binary::{BinaryNode, BinaryTree},
+    sweep::Leaves,
+};
 use crate::geometry::Aabb;
 use bytemuck::Zeroable;
 use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
+
+/// The nodes that the root leads to, if there may be others.
+pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves) -> Vec<BinaryNode> {
+    if leaves.below == 0.0 {
+        return nodes;
+    }
+    let mut counts = vec![1u32; nodes.len()];
+    for (index, node) in nodes.iter().enumerate().rev() {
+        if !node.is_leaf() {
+            let [left, right] = node.children();
+            counts[index] = counts[left] + counts[right];
+        }
+    }
+    lay_out(counts[0] as usize, 0, |index: usize, _| {
+        let node = nodes[index];
+        if node.is_leaf() {
+            return Part::Leaf(node);
+        }
+        let [left, right] = node.children();
+        Part::Inner {
+            left,
+            right,
+            left_leaves: counts[left] as usize,
+        }
+    })
+}
 
 /// What goes into a place of a new tree. `T` is whatever tells the parts of the old one apart.
 pub(super) enum Part<T> {

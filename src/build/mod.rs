@@ -8,7 +8,15 @@
 //! 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
 //! 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
 //!
-//! All binary trees on the way have their nodes in the order of `lay_out`. No step recurses deeper than a
+//! `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
+//!
+//! 1. `morton`: the `refs` along a curve.
+//! 2. `runs`: leaves of what follows each other.
+//! 3. `ploc`: the binary tree over leaves, from the bottom up; then 4 and 6 as above.
+//!
+//! `refit` makes boxes anew when primitives have moved.
+//!
+//! But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses deeper than a
 //! bound, whatever the tree.
 
 mod adopt;
@@ -20,15 +28,24 @@ mod collapse;
 mod cost;
 mod emit;
 mod error;
+mod fast;
+mod fill;
 mod group;
 mod input;
 mod lay_out;
+mod monitor;
+mod morton;
 mod parallel;
 mod pieces;
+mod pipeline;
+mod ploc;
+mod preset;
 mod rebalance;
+mod refit;
 mod refs;
 mod reinsertion;
 mod report;
+mod runs;
 mod spatial;
 mod split;
 mod sweep;
@@ -37,5 +54,7 @@ mod tests;
 
 pub use binary::{BinaryNode, BinaryTree, TreeError};
 pub use builder::Builder;
-pub use error::BuildError;
+pub use error::{BuildError, RefitError};
+pub use monitor::Monitor;
+pub use preset::Preset;
 pub use report::BuildReport;

@@ -52,6 +52,8 @@ impl<'a, I: Input> Pieces<'a, I> {
 
 impl<I: Input> Input for Pieces<'_, I> {
     type Leaf = I::Leaf;
+    type Filling = I::Filling;
+    const EMPTY: I::Filling = I::EMPTY;
     const MAX_LEAF: usize = I::MAX_LEAF;
     const JOINED: f32 = I::JOINED;
     const CAN_SPLIT: bool = false;
@@ -81,24 +83,25 @@ impl<I: Input> Input for Pieces<'_, I> {
         self.piece(number).map_or(number, |piece| piece.id)
     }
 
-    #[inline]
-    fn fits(&self, numbers: &[u32]) -> bool {
-        if self.pieces.is_empty() {
-            return self.input.fits(numbers);
-        }
-        let mut ids = [0; 8];
-        let ids = &mut ids[..numbers.len()];
-        for (id, &number) in ids.iter_mut().zip(numbers) {
-            *id = self.primitive(number);
-        }
-        self.input.fits(ids)
+    #[inline(always)]
+    fn clear(filling: &mut I::Filling) {
+        I::clear(filling);
+    }
+
+    #[inline(always)]
+    fn add(&self, filling: &mut I::Filling, number: u32) -> bool {
+        self.input.add(filling, self.primitive(number))
     }
 
     fn leaf_cost(count: usize) -> f32 {
         I::leaf_cost(count)
     }
 
-    fn leaf(&self, ids: &[u32], first: u32) -> Option<I::Leaf> {
-        self.input.leaf(ids, first)
+    fn aabb_of(filling: &I::Filling) -> Aabb {
+        I::aabb_of(filling)
+    }
+
+    fn leaf(filling: &I::Filling, first: u32) -> Option<I::Leaf> {
+        I::leaf(filling, first)
     }
 }

@@ -4,8 +4,10 @@ use super::{
     BuildError,
     cost::Measure,
     input::{Input, Verdict},
+    monitor::Watch,
 };
 use crate::geometry::{Aabb, TriangleMesh};
+use glam::Vec3A;
 use std::{vec, vec::Vec};
 use wide::f32x4;
 
@@ -120,6 +122,8 @@ struct Gathered {
     largest: f32,
 }
 
+/// The share of a build that this is.
+const GATHERED: f32 = 0.02;
 /// How many primitives are gathered in one go.
 const CHUNK: usize = 1 << 14;
 
@@ -128,12 +132,18 @@ impl Refs {
     ///
     /// # Errors
     /// The first primitive that is not finite, unless those are left out, or too many.
-    pub fn gather<I: Input>(input: &I, drop_non_finite: bool) -> Result<Self, BuildError> {
+    pub fn gather<I: Input>(
+        input: &I,
+        drop_non_finite: bool,
+        watch: &Watch,
+    ) -> Result<Self, BuildError> {
         if input.len() > TriangleMesh::MAX_TRIANGLES {
             return Err(BuildError::TooManyPrimitives(input.len()));
         }
+        watch.phase(GATHERED, input.len())?;
         let mut refs = vec![Ref::NONE; input.len()];
         let gather = |(chunk, refs): (usize, &mut [Ref])| {
+            watch.advance(refs.len());
             gather_chunk(input, chunk * CHUNK, refs, drop_non_finite)
         };
         #[cfg(feature = "rayon")]
@@ -187,11 +197,12 @@ fn gather_chunk<I: Input>(
         dropped: 0,
         largest: 0.0,
     };
+    let mut largest = Vec3A::ZERO;
     for id in start..start + refs.len() {
         match input.verdict(id as u32) {
             Verdict::Keep(aabb) => {
-                let largest = aabb.min.abs().max(aabb.max.abs()).max_element();
-                gathered.largest = largest.max(gathered.largest);
+                let (min, max) = (Vec3A::from(aabb.min), Vec3A::from(aabb.max));
+                largest = largest.max(min.abs()).max(max.abs());
                 refs[gathered.kept] = Ref::new(&aabb, id as u32);
                 gathered.kept += 1;
             }
@@ -200,5 +211,6 @@ fn gather_chunk<I: Input>(
             Verdict::NonFinite(error) | Verdict::Invalid(error) => return Err(error),
         }
     }
+    gathered.largest = largest.max_element();
     Ok(gathered)
 }

@@ -6,9 +6,11 @@
 //! the outcome is the same on any number of threads.
 
 use super::{
+    BuildError,
     binary::{BinaryNode, BinaryTree},
     cost::Measure,
     lay_out::{Part, lay_out},
+    monitor::Watch,
     refs::Bounds,
 };
 use glam::Vec3;
@@ -50,6 +52,13 @@ struct Search {
     looks: usize,
 }
 
+impl Search {
+    const NONE: Self = Self {
+        best: None,
+        looks: 0,
+    };
+}
+
 /// Where a subtree is best put: next to the node `to`, under a new parent.
 #[derive(Clone, Copy)]
 struct Move {
@@ -58,11 +67,20 @@ struct Move {
     gain: f32,
 }
 
-/// A tree over the same leaves, of no more cost. Both are in our order.
-pub(super) fn optimize(tree: BinaryTree, effort: Effort) -> BinaryTree {
+/// A tree over the same leaves, of no more cost. Both are in our order. `end` is where in the build this is done.
+///
+/// # Errors
+/// The build was cancelled.
+pub(super) fn optimize(
+    tree: BinaryTree,
+    effort: Effort,
+    end: f32,
+    watch: &Watch,
+) -> Result<BinaryTree, BuildError> {
     let Some(root) = tree.nodes().first() else {
-        return tree;
+        return Ok(tree);
     };
+    watch.phase(end, effort.rounds * (tree.nodes().len() / effort.share + 1))?;
     let measure = Measure::of_bounds(&root.aabb);
     let mut spots = spots(tree.nodes(), &measure);
     let mut touched = vec![false; spots.len()];
@@ -72,7 +90,10 @@ pub(super) fn optimize(tree: BinaryTree, effort: Effort) -> BinaryTree {
     let mut looks = 0;
     for _ in 0..effort.rounds {
         let candidates = candidates(&spots, &mut rests, effort.share, &mut keys);
-        let find = |&from: &u32| find(&spots, from);
+        let find = |&from: &u32| match watch.advance(1) {
+            true => find(&spots, from),
+            false => Search::NONE,
+        };
         #[cfg(feature = "rayon")]
         let searches: Vec<_> = {
             use rayon::prelude::*;
@@ -97,7 +118,8 @@ pub(super) fn optimize(tree: BinaryTree, effort: Effort) -> BinaryTree {
             break;
         }
     }
-    changed(&tree, &spots)
+    watch.check()?;
+    Ok(changed(&tree, &spots))
 }
 
 fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
@@ -358,7 +380,7 @@ fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
 mod tests {
     use super::*;
     use crate::{
-        build::{Builder, binned, input::Boxes, refs::Refs},
+        build::{Builder, binned, input::Boxes, refs::Refs, sweep::Leaves},
         geometry::Aabb,
     };
 
@@ -376,7 +398,14 @@ mod tests {
 
     fn binned(boxes: &[Aabb]) -> BinaryTree {
         let input = Boxes(boxes);
-        binned::build(&input, Refs::gather(&input, false).unwrap())
+        let watch = Watch::none();
+        binned::build(
+            &input,
+            Refs::gather(&input, false, &watch).unwrap(),
+            Leaves::SINGLE,
+            &watch,
+        )
+        .unwrap()
     }
 
     fn cost(nodes: &[BinaryNode]) -> f64 {
@@ -416,7 +445,7 @@ mod tests {
             share: 4,
             least_gain: 0.0,
         };
-        let after = optimize(before.clone(), effort);
+        let after = optimize(before.clone(), effort, 1.0, &Watch::none()).unwrap();
         assert!(cost(after.nodes()) < 0.99 * cost(before.nodes()));
 
         let mut order = after.order().to_vec();

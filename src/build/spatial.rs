@@ -10,14 +10,17 @@
 //! To cut before the build (Karras and Aila 2013) does not do: game levels did not get faster, at any budget.
 
 use super::{
+    BuildError,
     binary::{BinaryNode, BinaryTree},
     binned::{self, bounds_of_centers},
     clip::clip,
     input::Input,
-    lay_out::{Part, lay_out},
+    lay_out::{Part, lay_out, prune},
+    monitor::{STRIDE, Watch},
     pieces::{Piece, Pieces},
     refs::{Bounds, Ref, Refs},
     split::Cut,
+    sweep::Leaves,
 };
 use crate::geometry::TriangleMesh;
 use std::{vec, vec::Vec};
@@ -37,30 +40,45 @@ const MAX_DEPTH: u32 = 48;
 /// 16 are sooner done, and a level that gains 9 % of nodes and leaves then gains 3.
 const BINS: usize = 32;
 
+/// Where in a build the cuts are done, and the tree.
+const CUT: f32 = 0.35;
+const BUILT: f32 = 0.5;
+
 /// The tree over `refs`, one a leaf, and the pieces some are cut into: at most `fraction` of their number is added.
+///
+/// # Errors
+/// The build was cancelled.
 pub(super) fn build<'a, I: Input>(
     input: &'a I,
     refs: Refs,
     fraction: f32,
-) -> (BinaryTree, Pieces<'a, I>) {
+    leaves: Leaves,
+    watch: &Watch,
+) -> Result<(BinaryTree, Pieces<'a, I>), BuildError> {
     let count = refs.refs.len();
     // Every cut takes two new numbers at most.
     let numbers = TriangleMesh::MAX_TRIANGLES.saturating_sub(input.len()) / 2;
     let budget = ((count as f64 * f64::from(fraction.max(0.0))) as usize).min(numbers);
     let mut pieces = Pieces::whole(input);
     if !I::CAN_SPLIT || budget == 0 || count <= LEAST {
-        let tree = binned::build(&pieces, refs);
-        return (tree, pieces);
+        watch.phase(BUILT, count)?;
+        let tree = binned::build(&pieces, refs, leaves, watch)?;
+        return Ok((tree, pieces));
     }
+    let levels = (count / LEAST).ilog2() as usize + 1;
+    watch.phase(CUT, levels * count)?;
     let mut upper = Upper {
         pieces: &mut pieces,
+        watch,
         scale: refs.scale(),
         least_overlap: OVERLAP * bounds_of(&refs.refs).half_area(),
         parts: Vec::new(),
     };
     let root = upper.grow(refs.refs, budget, 0);
     let parts = upper.parts;
-    (finish(&pieces, root, parts), pieces)
+    watch.phase(BUILT, parts[root].count)?;
+    let tree = finish(&pieces, root, parts, leaves, watch)?;
+    Ok((tree, pieces))
 }
 
 /// A part of the tree.
@@ -78,6 +96,7 @@ struct Counted {
 
 struct Upper<'p, 'a, I> {
     pieces: &'p mut Pieces<'a, I>,
+    watch: &'p Watch<'p>,
     scale: f32,
     /// Scaled, as all boxes of references are.
     least_overlap: f32,
@@ -102,7 +121,8 @@ impl<I: Input> Upper<'_, '_, I> {
         let bounds = bounds_of(&refs);
         // What overlaps in there is no larger.
         let is_small = refs.len() <= LEAST || bounds.half_area() <= self.least_overlap;
-        if is_small || budget == 0 || depth >= MAX_DEPTH {
+        let go_on = self.watch.advance(refs.len());
+        if is_small || budget == 0 || depth >= MAX_DEPTH || !go_on {
             return self.rest(refs);
         }
         let Some(cut) = Cut::find(&refs, &bounds_of_centers(&refs)) else {
@@ -175,7 +195,10 @@ impl<I: Input> Upper<'_, '_, I> {
         let mut bins = vec![[Bin::EMPTY; BINS]; 3];
         let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
         let width = [0, 1, 2].map(|axis| (high[axis] - low[axis]) / BINS as f32);
-        for r in refs {
+        for (place, r) in refs.iter().enumerate() {
+            if place % (16 * STRIDE) == 0 {
+                self.watch.advance(0);
+            }
             let whole = r.bounds();
             let (min, max) = (whole.min.to_array(), whole.max.to_array());
             let mut corners = None;
@@ -383,7 +406,13 @@ struct Job {
 }
 
 /// Has what is left built, and puts all together.
-fn finish<I: Input>(pieces: &Pieces<I>, root: usize, mut parts: Vec<Counted>) -> BinaryTree {
+fn finish<I: Input>(
+    pieces: &Pieces<I>,
+    root: usize,
+    mut parts: Vec<Counted>,
+    leaves: Leaves,
+    watch: &Watch,
+) -> Result<BinaryTree, BuildError> {
     // In the order of `lay_out`.
     let mut jobs = Vec::new();
     let mut todo = vec![(root, 0, 1)];
@@ -402,7 +431,8 @@ fn finish<I: Input>(pieces: &Pieces<I>, root: usize, mut parts: Vec<Counted>) ->
             }),
         }
     }
-    let build = |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below);
+    let build =
+        |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below, leaves, watch);
     #[cfg(feature = "rayon")]
     let built: Vec<Vec<BinaryNode>> = {
         use rayon::prelude::*;
@@ -411,6 +441,7 @@ fn finish<I: Input>(pieces: &Pieces<I>, root: usize, mut parts: Vec<Counted>) ->
     #[cfg(not(feature = "rayon"))]
     let built: Vec<Vec<BinaryNode>> = jobs.iter_mut().map(build).collect();
 
+    watch.check()?;
     let order = jobs.iter().flat_map(|job| job.refs.iter().map(Ref::id));
     let order = order.collect();
     let mut built = built.into_iter();
@@ -422,5 +453,5 @@ fn finish<I: Input>(pieces: &Pieces<I>, root: usize, mut parts: Vec<Counted>) ->
         },
         Grown::Rest(_) => Part::Tree(built.next().unwrap_or_default()),
     });
-    BinaryTree::new_unchecked(nodes, order)
+    Ok(BinaryTree::new_unchecked(prune(nodes, leaves), order))
 }

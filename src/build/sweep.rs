@@ -1,4 +1,4 @@
-//! A few references, split down to single ones: every cut on every axis is weighed.
+//! A few references, split down to single ones or leaves: every cut on every axis is weighed.
 //!
 //! The references are sorted once an axis; a cut keeps the other axes' orders.
 
@@ -7,9 +7,10 @@ use super::{
     input::Input,
     refs::{Bounds, Ref},
 };
+use crate::geometry::Aabb;
 
 /// The most references that are swept. Above it bins are faster and lose next to nothing.
-pub(super) const MAX: usize = 64;
+pub(super) const MAX: usize = 32;
 
 /// References by place, and their order along each axis.
 struct Sweep<'a, I> {
@@ -18,6 +19,33 @@ struct Sweep<'a, I> {
     orders: [[u8; MAX]; 3],
     /// The place of `refs[0]` in the tree's order.
     first: u32,
+    leaves: Leaves,
+}
+
+/// How far down a tree goes: to single primitives; or to leaves of as many as there is room for, if their box is small.
+/// Such a leaf saves nodes, in whose places there are leaves to which nothing leads.
+#[derive(Clone, Copy)]
+pub(super) struct Leaves {
+    /// Half the area, scaled, below which a leaf is full.
+    pub below: f32,
+}
+
+impl Leaves {
+    pub const SINGLE: Self = Self { below: 0.0 };
+    pub const FULL: Self = Self { below: f32::MAX };
+
+    /// Full leaves of less than this share of the area of all.
+    pub fn smaller_than(share: f32, refs: &[Ref]) -> Self {
+        let bounds = refs
+            .iter()
+            .fold(Bounds::EMPTY, |all, r| all.join(r.bounds()));
+        Self {
+            below: match refs {
+                [] => 0.0,
+                _ => share * bounds.half_area(),
+            },
+        }
+    }
 }
 
 /// Builds the tree over `refs`, at most [`MAX`] of them, and leaves them in its order: `root`, and the
@@ -29,6 +57,7 @@ pub(super) fn build<I: Input>(
     root: &mut BinaryNode,
     below: &mut [BinaryNode],
     at: u32,
+    leaves: Leaves,
 ) {
     let len = refs.len();
     let mut sweep = Sweep {
@@ -36,6 +65,7 @@ pub(super) fn build<I: Input>(
         refs: [Ref::NONE; MAX],
         orders: [[0; MAX]; 3],
         first,
+        leaves,
     };
     sweep.refs[..len].copy_from_slice(refs);
     let mut keys = [0; MAX];
@@ -74,17 +104,23 @@ impl<I: Input> Sweep<'_, I> {
         below: &mut [BinaryNode],
         at: u32,
     ) {
+        let fits = end - start <= I::MAX_LEAF && self.fits(start, end);
+        if fits || end - start == 1 {
+            *root = self.leaf(start, end);
+            // Nothing leads to the nodes that this saves, but they are looked at.
+            below.fill(self.leaf(start, start + 1));
+            return;
+        }
         let [left, right, below @ ..] = below else {
-            let id = self.refs[self.orders[0][start] as usize].id();
-            *root = BinaryNode {
-                aabb: self.input.aabb(id),
-                first: self.first + start as u32,
-                count: 1,
-            };
             return;
         };
-        let (axis, mid) = self.cheapest(start, end);
-        self.partition(axis, start, mid, end);
+        // Of two there is one cut.
+        let mut mid = start + 1;
+        if end - start > 2 {
+            let axis;
+            (axis, mid) = self.cheapest(start, end);
+            self.partition(axis, start, mid, end);
+        }
         let (left_below, right_below) = below.split_at_mut(2 * (mid - start) - 2);
         let left_at = at + 2;
         let right_at = left_at + left_below.len() as u32;
@@ -95,6 +131,30 @@ impl<I: Input> Sweep<'_, I> {
             first: at,
             count: 0,
         };
+    }
+
+    fn id(&self, place: usize) -> u32 {
+        self.refs[self.orders[0][place] as usize].id()
+    }
+
+    fn leaf(&self, start: usize, end: usize) -> BinaryNode {
+        let aabbs = (start..end).map(|place| self.input.aabb(self.id(place)));
+        BinaryNode {
+            aabb: aabbs.reduce(Aabb::join).unwrap_or(Aabb::EMPTY),
+            first: self.first + start as u32,
+            count: (end - start) as u32,
+        }
+    }
+
+    /// Whether these can be one leaf, and one that is small enough.
+    fn fits(&self, start: usize, end: usize) -> bool {
+        let refs = self.orders[0][start..end].iter();
+        let bounds = refs.fold(Bounds::EMPTY, |bounds, &place| {
+            bounds.join(self.refs[place as usize].bounds())
+        });
+        let mut filling = I::EMPTY;
+        bounds.half_area() < self.leaves.below
+            && (start..end).all(|place| self.input.add(&mut filling, self.id(place)))
     }
 
     /// The axis and the place of the cheapest cut; of equals the one nearest to halves.

@@ -1,12 +1,13 @@
 //! Whole builds, held to what every hierarchy must be.
 
-use super::{BinaryNode, BinaryTree, BuildError, Builder};
+use super::{BinaryNode, BinaryTree, BuildError, Builder, Preset};
 use crate::{
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{Bvh, Bvh8, ChildKind, Leaf, Node4, Node8, Owned, TriangleLeaf, WideNode},
 };
+use core::ops::ControlFlow;
 use glam::Vec3;
-use std::{format, vec, vec::Vec};
+use std::{format, sync::Mutex, vec, vec::Vec};
 
 type Position = [f32; 3];
 
@@ -90,7 +91,6 @@ fn check_bvh<N: WideNode, L: Leaf>(
     let leaf_aabb = |leaf: usize| {
         let places = bvh.leaves()[leaf].primitives();
         let ids = &bvh.primitives()[places.start as usize..places.end as usize];
-        assert!(ids.is_sorted());
         ids.iter().fold(Aabb::EMPTY, |all, &id| all.join(aabb(id)))
     };
     let mut boxes = vec![Aabb::EMPTY; bvh.nodes().len()];
@@ -191,6 +191,11 @@ fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
     let bvh = builder.build(&mesh).unwrap();
     check_bvh(&bvh, &all, aabb);
     check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
+    for preset in [Preset::Fast, Preset::Balanced] {
+        let builder = Builder::preset(preset);
+        check_bvh(&builder.build(&mesh).unwrap(), &all, aabb);
+        check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
+    }
 
     let tree = builder.build_binary(&mesh).unwrap();
     let (nodes, order) = tree.into_parts();
@@ -540,17 +545,73 @@ fn the_same_on_any_number_of_threads() {
     positions.extend(needles(10_000, 41));
     let indices = soup(&positions);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-    let build = |threads: usize| {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap()
-            .install(|| Builder::new().build(&mesh).unwrap())
-    };
-    let one = build(1);
-    for threads in [2, 7] {
-        assert_same(&one, &build(threads));
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+        let build = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap()
+                .install(|| Builder::preset(preset).build(&mesh).unwrap())
+        };
+        let one = build(1);
+        for threads in [2, 7] {
+            assert_same(&one, &build(threads));
+        }
     }
+}
+
+/// What a monitor is told, which stops the build when told so often.
+fn watched<T>(
+    stop_at: usize,
+    builder: Builder,
+    build: impl Fn(Builder) -> Result<T, BuildError>,
+) -> (Result<T, BuildError>, Vec<f32>) {
+    let told = Mutex::new(Vec::new());
+    let monitor = |fraction: f32| {
+        let mut told = told.lock().unwrap();
+        told.push(fraction);
+        match told.len() > stop_at {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    };
+    let built = build(builder.monitor(&monitor));
+    (built, told.into_inner().unwrap())
+}
+
+fn check_cancel<T>(builder: Builder, build: impl Fn(Builder) -> Result<T, BuildError>) {
+    let watched = |stop_at| watched(stop_at, builder, &build);
+    let (built, told) = watched(usize::MAX);
+    assert!(built.is_ok());
+    assert!(told.len() > 8 && told.is_sorted(), "{told:?}");
+    assert!(told[0] >= 0.0 && told[told.len() - 1] <= 1.0);
+    assert!(told[told.len() - 1] > 0.9, "{told:?}");
+    for stop_at in 0..told.len() {
+        let (built, told) = watched(stop_at);
+        assert_eq!(built.err(), Some(BuildError::Cancelled), "{stop_at}");
+        // With threads, another may be about to tell.
+        assert!(told.len() <= stop_at + 1);
+    }
+}
+
+#[test]
+fn progress_and_cancel() {
+    let positions = needles(3000, 43);
+    let indices = soup(&positions);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+        check_cancel(Builder::preset(preset), |builder| builder.build(&mesh));
+    }
+    let (tree, new) = (chain(3000), Builder::new());
+    check_cancel(new, |builder| builder.build_from_tree(&mesh, &tree));
+    check_cancel(new, |builder| builder.build_binary(&mesh));
+    let boxes: Vec<_> = (0..3000)
+        .map(|id| Aabb::from_points(mesh.triangle(id).unwrap()))
+        .collect();
+    check_cancel(new, |builder| builder.build_primitives::<Node4>(&boxes));
+    // A monitor changes nothing.
+    let (watched, _) = watched(usize::MAX, new, |builder| builder.build(&mesh));
+    assert_same(&watched.unwrap(), &Builder::new().build(&mesh).unwrap());
 }
 
 impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {

@@ -1,11 +1,29 @@
 //! Triangles without area, told apart exactly.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// Whether a triangle's corners lie on one line, exactly: no rounding is involved.
 ///
 /// Such a triangle is never hit. It has no normal, and whether a ray "meets" it would be a matter of rounding.
+#[inline]
 pub(crate) fn is_degenerate(corners: [Vec3; 3]) -> bool {
+    !has_area(corners) && is_collinear(corners)
+}
+
+/// Whether `f32` is enough to see that a triangle has an area.
+///
+/// A difference is off by 2^-24 of itself, a product by three times that, and the normal by 2^-21 of the terms; what
+/// products lose to underflow is less than that of terms of 2^-100.
+#[inline(always)]
+fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(Vec3A::from);
+    let (ab, ac) = (b - a, c - a);
+    let normal = ab.cross(ac).abs();
+    let terms = ab.abs().max_element() * ac.abs().max_element();
+    terms > f32::from_bits(27 << 23) && normal.max_element() > terms * (f32::EPSILON * 16.0)
+}
+
+fn is_collinear(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     // Nearly every triangle is told by this: an error of 2^-50 times the terms is more than generous.
     let (ab, ac) = (b - a, c - a);

@@ -148,6 +148,14 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
     }
 }
 
+#[cfg(feature = "std")]
+impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
+    /// What changes when primitives move: leaves, nodes, and the bounds. That it stays sound is up to the caller.
+    pub(crate) fn moving_parts(&mut self) -> (&mut alloc::vec::Vec<L>, &mut [N], &mut Aabb) {
+        (&mut self.leaves, &mut self.nodes, &mut self.bounds)
+    }
+}
+
 impl<N: WideNode, L: Leaf, S: Storage> fmt::Debug for Bvh<N, L, S> {
     /// How much there is of each part, not the parts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -70,6 +70,23 @@ impl TriangleLeaf {
         })
     }
 
+    /// A leaf of `count` triangles, whose corners are lanes of `vertices`; both repeat the first past the last.
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    pub(crate) fn from_lanes(
+        vertices: [[f32; 8]; 3],
+        corners: [[u8; 8]; 3],
+        first: u32,
+        count: usize,
+    ) -> Self {
+        Self {
+            vertices,
+            corners,
+            first,
+            count: count as u32,
+        }
+    }
+
     /// The ray against all its triangles, up to `t_max`. If `NEED_T` is not set, it is enough to know
     /// whether any is hit.
     #[inline(always)]

@@ -219,11 +219,15 @@ impl<const W: usize, A> Node<W, A> {
         node
     }
 
+    #[inline]
     fn aabb(&self, lane: usize) -> Aabb {
         if lane >= W {
             return Aabb::EMPTY;
         }
-        let side = |side: usize| [0, 1, 2].map(|axis| self.planes[axis][side][lane]).into();
-        Aabb::new(side(0), side(1))
+        let [[min_x, max_x], [min_y, max_y], [min_z, max_z]] = &self.planes;
+        Aabb::new(
+            Vec3::new(min_x[lane], min_y[lane], min_z[lane]),
+            Vec3::new(max_x[lane], max_y[lane], max_z[lane]),
+        )
     }
 }

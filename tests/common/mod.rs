@@ -7,7 +7,7 @@ use proptest::{
     test_runner::{Config, RngSeed},
 };
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
     reference,
@@ -44,6 +44,14 @@ impl Variants {
         let builder = Builder::new().drop_non_finite(true);
         add_width(&mut queries, builder.build_as::<Node8>(&mesh).unwrap());
         add_width(&mut queries, builder.build_as::<Node4>(&mesh).unwrap());
+        for preset in [Preset::Balanced, Preset::Fast] {
+            let builder = Builder::preset(preset).drop_non_finite(true);
+            let name = |width| format!("{preset:?}, {width}-wide");
+            let bvh = builder.build_as::<Node8>(&mesh).unwrap();
+            add(&mut queries, name(8), bvh);
+            let bvh = builder.build_as::<Node4>(&mesh).unwrap();
+            add(&mut queries, name(4), bvh);
+        }
         Self {
             positions,
             indices,
@@ -91,11 +99,21 @@ fn add_width<N: WideNode + Sync>(queries: &mut Vec<Query>, bvh: Bvh<N, TriangleL
     for backend in Backend::available() {
         let mut bvh = bvh.clone();
         bvh.set_backend(backend);
-        queries.push((
+        add(
+            queries,
             format!("{}-wide, {}", N::WIDTH, backend.name()),
-            Box::new(move |ray| (bvh.closest_hit(ray), bvh.any_hit(ray))),
-        ));
+            bvh,
+        );
     }
+}
+
+fn add<N: WideNode + Sync>(
+    queries: &mut Vec<Query>,
+    name: String,
+    bvh: Bvh<N, TriangleLeaf, Owned>,
+) {
+    let query = move |ray: &Ray| (bvh.closest_hit(ray), bvh.any_hit(ray));
+    queries.push((name, Box::new(query)));
 }
 
 /// A hit as bits, for -0 to differ from 0.
