@@ -81,15 +81,32 @@ pub fn dust(rng: &mut Rng) -> Case {
     case
 }
 
-/// Long triangles across one another, enough of them for the builder to cut some.
+/// Long triangles across one another, enough of them for the builder to cut some; or many, nearly the same, that one
+/// plane meets all of.
 pub fn pieces(rng: &mut Rng) -> Case {
-    let triangles: Vec<[Vec3; 3]> = (0..rng.usize(1100..1600))
+    let count = rng.usize(1100..1600);
+    let alike = rng.usize(1..40);
+    let jitter = if rng.bool() {
+        0.0
+    } else {
+        log_uniform(rng, -3.0, 0.0)
+    };
+    let mut triangles: Vec<[Vec3; 3]> = (0..count)
         .map(|i| {
             let at = unit(rng) * 10.0;
             let far = unit(rng) * if i % 3 == 0 { 6.0 } else { 0.3 };
             [at, at + unit(rng) * 0.1, at + far]
         })
         .collect();
+    if rng.bool() {
+        let size = log_uniform(rng, 0.0, 2.0);
+        for i in alike..count {
+            triangles[i] = triangles[i % alike].map(|p| p + unit(rng) * jitter);
+        }
+        for triangle in triangles.iter_mut().step_by(rng.usize(1..5)) {
+            *triangle = triangle.map(|p| triangle[0].lerp(p, size));
+        }
+    }
     let mesh = meshes::of_triangles("pieces", &triangles);
     at(rng, mesh, ALL)
 }
