@@ -3,8 +3,8 @@
 //!
 //! Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
 
-use super::refs::{Bounds, Ref};
-use wide::f32x4;
+use super::refs::{Bounds, Ref, half_areas};
+use wide::{f32x4, i32x4};
 
 /// The most bins an axis is cut into.
 const MAX_BINS: usize = 32;
@@ -53,13 +53,13 @@ impl Grid {
 #[derive(Clone)]
 struct Bins {
     bounds: [[Bounds; 3]; MAX_BINS],
-    counts: [[u32; 3]; MAX_BINS],
+    counts: [[u32; 4]; MAX_BINS],
 }
 
 impl Bins {
     const EMPTY: Self = Self {
         bounds: [[Bounds::EMPTY; 3]; MAX_BINS],
-        counts: [[0; 3]; MAX_BINS],
+        counts: [[0; 4]; MAX_BINS],
     };
 
     fn fill(&mut self, grid: &Grid, refs: &[Ref]) {
@@ -155,42 +155,65 @@ impl Cut {
 
 impl Grid {
     fn cheapest(&self, bins: &Bins) -> Option<Cut> {
-        // Cost, then how uneven it is: where areas are all zero, halves keep the tree shallow.
-        let mut best = (f32::INFINITY, u32::MAX);
-        let mut cut = None;
-        for axis in 0..3 {
-            if self.scale.to_array()[axis] == 0.0 {
+        let join = |all: &mut [Bounds; 3], bin: &[Bounds; 3]| {
+            *all = [0, 1, 2].map(|axis| all[axis].join(bin[axis]));
+        };
+        // What the right side of a cut before each bin comes to: an axis a lane.
+        let mut right_costs = [f32x4::ZERO; MAX_BINS];
+        let mut right_counts = [[0; 4]; MAX_BINS];
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 3], [0; 4]);
+        for bin in (1..self.bins).rev() {
+            join(&mut bounds, &bins.bounds[bin]);
+            add(&mut counts, &bins.counts[bin]);
+            right_counts[bin] = counts;
+            right_costs[bin] = half_areas(bounds) * floats(counts);
+        }
+        // By axis, the cost, and then how uneven it is: where areas are all zero, halves keep the tree shallow.
+        let mut best = [((f32::INFINITY, u32::MAX), 0); 3];
+        let mut least = f32x4::splat(f32::INFINITY);
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 3], [0; 4]);
+        for bin in 1..self.bins {
+            join(&mut bounds, &bins.bounds[bin - 1]);
+            add(&mut counts, &bins.counts[bin - 1]);
+            let costs = half_areas(bounds) * floats(counts) + right_costs[bin];
+            if costs.simd_le(least).to_bitmask() & 7 == 0 {
                 continue;
             }
-            // What the right side of a cut before each bin comes to.
-            let mut right = [(0.0, 0); MAX_BINS];
-            let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-            for bin in (1..self.bins).rev() {
-                bounds = bounds.join(bins.bounds[bin][axis]);
-                count += bins.counts[bin][axis];
-                if count > 0 {
-                    right[bin] = (bounds.half_area() * count as f32, count);
+            let costs = costs.to_array();
+            for (axis, best) in best.iter_mut().enumerate() {
+                let (left, right) = (counts[axis], right_counts[bin][axis]);
+                let key = (costs[axis], left.abs_diff(right));
+                if left > 0 && right > 0 && key < best.0 {
+                    *best = (key, bin);
                 }
             }
-            let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-            for (bin, &(right_cost, right_count)) in right[..self.bins].iter().enumerate().skip(1) {
-                bounds = bounds.join(bins.bounds[bin - 1][axis]);
-                count += bins.counts[bin - 1][axis];
-                if count == 0 || right_count == 0 {
-                    continue;
-                }
-                let cost = bounds.half_area() * count as f32 + right_cost;
-                let key = (cost, count.abs_diff(right_count));
-                if key < best {
-                    best = key;
-                    cut = Some(Cut {
-                        grid: *self,
-                        axis,
-                        bin: bin as i32,
-                    });
-                }
+            least = f32x4::new([best[0].0.0, best[1].0.0, best[2].0.0, f32::NEG_INFINITY]);
+        }
+        let scale = self.scale.to_array();
+        let mut cheapest = (f32::INFINITY, u32::MAX);
+        let mut cut = None;
+        for (axis, (key, bin)) in best.into_iter().enumerate() {
+            if scale[axis] > 0.0 && key < cheapest {
+                cheapest = key;
+                cut = Some(Cut {
+                    grid: *self,
+                    axis,
+                    bin: bin as i32,
+                });
             }
         }
         cut
     }
+}
+
+fn add(all: &mut [u32; 4], counts: &[u32; 4]) {
+    for (all, count) in all.iter_mut().zip(counts) {
+        *all += count;
+    }
+}
+
+/// Counts as floats: they are less than 2^31.
+#[inline(always)]
+fn floats(counts: [u32; 4]) -> f32x4 {
+    f32x4::from_i32x4(i32x4::new(counts.map(|count| count as i32)))
 }
