@@ -38,8 +38,8 @@ const GROUPED: Effort = Effort {
 
 /// Most of what there is to gain, in a few rounds.
 const QUICK: Effort = Effort {
-    rounds: 3,
-    share: 4,
+    rounds: 5,
+    share: 10,
     least_gain: 1e-2,
 };
 

@@ -3,11 +3,9 @@
 //!
 //! Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
 
-use super::refs::{Bounds, Ref};
-use wide::f32x4;
+use super::refs::{Bounds, Ref, half_areas};
+use wide::{f32x4, i32x4};
 
-/// The most bins an axis is cut into.
-const MAX_BINS: usize = 32;
 /// So many references are binned in one go where many cores share the work.
 #[cfg(feature = "rayon")]
 const CHUNK: usize = 1 << 14;
@@ -17,7 +15,6 @@ const CHUNK: usize = 1 << 14;
 pub(super) struct Grid {
     origin: f32x4,
     scale: f32x4,
-    bins: usize,
 }
 
 impl Grid {
@@ -36,7 +33,6 @@ impl Grid {
         Self {
             origin: centers.min,
             scale: f32x4::new([scale(0), scale(1), scale(2), 0.0]),
-            bins,
         }
     }
 
@@ -51,15 +47,15 @@ impl Grid {
 
 /// What is in the bins.
 #[derive(Clone)]
-struct Bins {
-    bounds: [[Bounds; 3]; MAX_BINS],
-    counts: [[u32; 3]; MAX_BINS],
+struct Bins<const B: usize> {
+    bounds: [[Bounds; 3]; B],
+    counts: [[u32; 4]; B],
 }
 
-impl Bins {
+impl<const B: usize> Bins<B> {
     const EMPTY: Self = Self {
-        bounds: [[Bounds::EMPTY; 3]; MAX_BINS],
-        counts: [[0; 3]; MAX_BINS],
+        bounds: [[Bounds::EMPTY; 3]; B],
+        counts: [[0; 4]; B],
     };
 
     fn fill(&mut self, grid: &Grid, refs: &[Ref]) {
@@ -68,7 +64,7 @@ impl Bins {
             let bins = grid.bins(r.center2());
             for (axis, &bin) in bins[..3].iter().enumerate() {
                 // The mask changes nothing; it shows that the bin is there.
-                let bin = bin as usize & (MAX_BINS - 1);
+                let bin = bin as usize & (B - 1);
                 let place = &mut self.bounds[bin][axis];
                 *place = place.join(bounds);
                 self.counts[bin][axis] += 1;
@@ -79,7 +75,7 @@ impl Bins {
     /// Joins what is in another's bins. Neither order nor grouping of such joins shows in the result.
     #[cfg(feature = "rayon")]
     fn join(mut self: std::boxed::Box<Self>, other: &Self) -> std::boxed::Box<Self> {
-        for bin in 0..MAX_BINS {
+        for bin in 0..B {
             for axis in 0..3 {
                 self.bounds[bin][axis] = self.bounds[bin][axis].join(other.bounds[bin][axis]);
                 self.counts[bin][axis] += other.counts[bin][axis];
@@ -102,18 +98,21 @@ impl Cut {
     /// The cheapest cut, or `None` if all centers are in one place.
     pub fn find(refs: &[Ref], centers: &Bounds) -> Option<Self> {
         // Few references need few bins: there is as much work in a bin as in some references.
-        let bins = if refs.len() < 256 {
-            MAX_BINS / 2
-        } else {
-            MAX_BINS
-        };
-        let grid = Grid::new(centers, bins);
+        match refs.len() {
+            0..256 => Self::find_in::<16>(refs, centers),
+            _ => Self::find_in::<32>(refs, centers),
+        }
+    }
+
+    /// The cheapest of the cuts between `B` bins, a power of two.
+    fn find_in<const B: usize>(refs: &[Ref], centers: &Bounds) -> Option<Self> {
+        let grid = Grid::new(centers, B);
         #[cfg(feature = "rayon")]
         if refs.len() > 4 * CHUNK {
             use rayon::prelude::*;
             use std::boxed::Box;
             let filled = |refs: &[Ref]| {
-                let mut bins = Box::new(Bins::EMPTY);
+                let mut bins = Box::new(Bins::<B>::EMPTY);
                 bins.fill(&grid, refs);
                 bins
             };
@@ -123,7 +122,7 @@ impl Cut {
                 .reduce(|| Box::new(Bins::EMPTY), |a, b| a.join(&b));
             return grid.cheapest(&bins);
         }
-        let mut bins = Bins::EMPTY;
+        let mut bins = Bins::<B>::EMPTY;
         bins.fill(&grid, refs);
         grid.cheapest(&bins)
     }
@@ -154,43 +153,66 @@ impl Cut {
 }
 
 impl Grid {
-    fn cheapest(&self, bins: &Bins) -> Option<Cut> {
-        // Cost, then how uneven it is: where areas are all zero, halves keep the tree shallow.
-        let mut best = (f32::INFINITY, u32::MAX);
-        let mut cut = None;
-        for axis in 0..3 {
-            if self.scale.to_array()[axis] == 0.0 {
+    fn cheapest<const B: usize>(&self, bins: &Bins<B>) -> Option<Cut> {
+        let join = |all: &mut [Bounds; 3], bin: &[Bounds; 3]| {
+            *all = [0, 1, 2].map(|axis| all[axis].join(bin[axis]));
+        };
+        // What the right side of a cut before each bin comes to: an axis a lane.
+        let mut right_costs = [f32x4::ZERO; B];
+        let mut right_counts = [[0; 4]; B];
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 3], [0; 4]);
+        for bin in (1..B).rev() {
+            join(&mut bounds, &bins.bounds[bin]);
+            add(&mut counts, &bins.counts[bin]);
+            right_counts[bin] = counts;
+            right_costs[bin] = half_areas(bounds) * floats(counts);
+        }
+        // By axis, the cost, and then how uneven it is: where areas are all zero, halves keep the tree shallow.
+        let mut best = [((f32::INFINITY, u32::MAX), 0); 3];
+        let mut least = f32x4::splat(f32::INFINITY);
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 3], [0; 4]);
+        for bin in 1..B {
+            join(&mut bounds, &bins.bounds[bin - 1]);
+            add(&mut counts, &bins.counts[bin - 1]);
+            let costs = half_areas(bounds) * floats(counts) + right_costs[bin];
+            if costs.simd_le(least).to_bitmask() & 7 == 0 {
                 continue;
             }
-            // What the right side of a cut before each bin comes to.
-            let mut right = [(0.0, 0); MAX_BINS];
-            let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-            for bin in (1..self.bins).rev() {
-                bounds = bounds.join(bins.bounds[bin][axis]);
-                count += bins.counts[bin][axis];
-                if count > 0 {
-                    right[bin] = (bounds.half_area() * count as f32, count);
+            let costs = costs.to_array();
+            for (axis, best) in best.iter_mut().enumerate() {
+                let (left, right) = (counts[axis], right_counts[bin][axis]);
+                let key = (costs[axis], left.abs_diff(right));
+                if left > 0 && right > 0 && key < best.0 {
+                    *best = (key, bin);
                 }
             }
-            let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-            for (bin, &(right_cost, right_count)) in right[..self.bins].iter().enumerate().skip(1) {
-                bounds = bounds.join(bins.bounds[bin - 1][axis]);
-                count += bins.counts[bin - 1][axis];
-                if count == 0 || right_count == 0 {
-                    continue;
-                }
-                let cost = bounds.half_area() * count as f32 + right_cost;
-                let key = (cost, count.abs_diff(right_count));
-                if key < best {
-                    best = key;
-                    cut = Some(Cut {
-                        grid: *self,
-                        axis,
-                        bin: bin as i32,
-                    });
-                }
+            least = f32x4::new([best[0].0.0, best[1].0.0, best[2].0.0, f32::NEG_INFINITY]);
+        }
+        let scale = self.scale.to_array();
+        let mut cheapest = (f32::INFINITY, u32::MAX);
+        let mut cut = None;
+        for (axis, (key, bin)) in best.into_iter().enumerate() {
+            if scale[axis] > 0.0 && key < cheapest {
+                cheapest = key;
+                cut = Some(Cut {
+                    grid: *self,
+                    axis,
+                    bin: bin as i32,
+                });
             }
         }
         cut
     }
+}
+
+fn add(all: &mut [u32; 4], counts: &[u32; 4]) {
+    for (all, count) in all.iter_mut().zip(counts) {
+        *all += count;
+    }
+}
+
+/// Counts as floats: they are less than 2^31.
+#[inline(always)]
+fn floats(counts: [u32; 4]) -> f32x4 {
+    f32x4::from_i32x4(i32x4::new(counts.map(|count| count as i32)))
 }

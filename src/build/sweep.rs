@@ -5,9 +5,10 @@
 use super::{
     binary::BinaryNode,
     input::Input,
-    refs::{Bounds, Ref},
+    refs::{Bounds, Ref, half_areas},
 };
 use crate::geometry::Aabb;
+use wide::f32x4;
 
 /// The most references that are swept. Above it bins are faster and lose next to nothing.
 pub(super) const MAX: usize = 32;
@@ -158,30 +159,50 @@ impl<I: Input> Sweep<'_, I> {
     }
 
     /// The axis and the place of the cheapest cut; of equals the one nearest to halves.
+    #[inline]
     fn cheapest(&self, start: usize, end: usize) -> (usize, usize) {
-        let mut best = (f32::INFINITY, usize::MAX);
-        let mut cut = (0, (start + end) / 2);
-        let mut right_costs = [0.0; MAX];
-        for axis in 0..3 {
-            let order = &self.orders[axis][start..end];
-            let len = order.len();
-            let mut bounds = Bounds::EMPTY;
-            for place in (1..len).rev() {
-                bounds = bounds.join(self.refs[order[place] as usize].bounds());
-                right_costs[place] = bounds.half_area() * (len - place) as f32;
+        let len = end - start;
+        let [xs, ys, zs] = &self.orders;
+        let (xs, ys, zs) = (&xs[start..end], &ys[start..end], &zs[start..end]);
+        let at = |order: &[u8], place: usize| self.refs[order[place] as usize].bounds();
+        let join = |all: [Bounds; 3], place: usize| {
+            [
+                all[0].join(at(xs, place)),
+                all[1].join(at(ys, place)),
+                all[2].join(at(zs, place)),
+            ]
+        };
+        // An axis a lane.
+        let mut right_costs = [f32x4::ZERO; MAX];
+        let mut bounds = [Bounds::EMPTY; 3];
+        for place in (1..len).rev() {
+            bounds = join(bounds, place);
+            right_costs[place] = half_areas(bounds) * f32x4::splat((len - place) as f32);
+        }
+        let mut best = [((f32::INFINITY, usize::MAX), len / 2); 3];
+        let mut least = f32x4::splat(f32::INFINITY);
+        let mut bounds = [Bounds::EMPTY; 3];
+        for place in 1..len {
+            bounds = join(bounds, place - 1);
+            let costs = half_areas(bounds) * f32x4::splat(place as f32) + right_costs[place];
+            if costs.simd_le(least).to_bitmask() & 7 == 0 {
+                continue;
             }
-            let mut bounds = Bounds::EMPTY;
-            for place in 1..len {
-                bounds = bounds.join(self.refs[order[place - 1] as usize].bounds());
-                let cost = bounds.half_area() * place as f32 + right_costs[place];
+            for (best, cost) in best.iter_mut().zip(costs.to_array()) {
                 let key = (cost, place.abs_diff(len - place));
-                if key < best {
-                    best = key;
-                    cut = (axis, start + place);
+                if key < best.0 {
+                    *best = (key, place);
                 }
             }
+            least = f32x4::new([best[0].0.0, best[1].0.0, best[2].0.0, f32::NEG_INFINITY]);
         }
-        cut
+        let mut axis = 0;
+        for other in 1..3 {
+            if best[other].0 < best[axis].0 {
+                axis = other;
+            }
+        }
+        (axis, start + best[axis].1)
     }
 
     /// Has the other axes' orders agree on what is left of `mid`.
