@@ -29,18 +29,10 @@ impl<'a, I: Input> Pieces<'a, I> {
         }
     }
 
-    /// Puts a piece in another's place, or after all others: its number.
-    pub fn put(&mut self, number: Option<u32>, piece: Piece) -> u32 {
-        let primitives = self.input.len();
-        let place = number.and_then(|number| (number as usize).checked_sub(primitives));
-        match place.and_then(|place| self.pieces.get_mut(place)) {
-            Some(old) => *old = piece,
-            None => self.pieces.push(piece),
-        }
-        match place {
-            Some(place) => (primitives + place) as u32,
-            None => (primitives + self.pieces.len() - 1) as u32,
-        }
+    /// Adds a piece: its number.
+    pub fn add_piece(&mut self, piece: Piece) -> u32 {
+        self.pieces.push(piece);
+        (self.input.len() + self.pieces.len() - 1) as u32
     }
 
     #[inline]

@@ -5,11 +5,13 @@
 use super::{binary::BinaryNode, monitor::Watch};
 use crate::geometry::Aabb;
 use std::{vec, vec::Vec};
-use wide::f32x4;
+use wide::{f32x4, u32x4};
 
 /// How far along the curve a cluster looks to either side. A multiple of 4.
 const RADIUS: usize = 4;
 const SLOTS: usize = 2 * RADIUS;
+/// The bits that tell them apart.
+const SLOT: u32 = SLOTS.next_power_of_two() as u32 - 1;
 /// One of so many clusters of a part is left for those of other parts to be joined with.
 const LEFT: usize = 16;
 
@@ -114,7 +116,8 @@ impl Clusters {
         let planes = [at(x0), at(y0), at(z0), at(x1), at(y1), at(z1)];
         let own = |side: usize| f32x4::splat(planes[side][RADIUS]);
         let [x0, y0, z0, x1, y1, z1] = [own(0), own(1), own(2), own(3), own(4), own(5)];
-        let mut best = f32x4::splat(f32::MAX);
+        // As integers, which are ordered as numbers that are not negative are: a denormal is not to be flushed to zero.
+        let mut best = u32x4::splat(u32::MAX);
         for block in 0..SLOTS / 4 {
             // Its own place is left out.
             let start = 4 * block + usize::from(4 * block >= RADIUS);
@@ -131,13 +134,13 @@ impl Clusters {
             let y = y1.fast_max(load(4)) - y0.fast_min(load(1));
             let z = z1.fast_max(load(5)) - z0.fast_min(load(2));
             let area = x * y + (x + y) * z;
-            let slot = |lane: u32| f32::from_bits(4 * block as u32 + lane);
-            let slots = f32x4::new([slot(0), slot(1), slot(2), slot(3)]);
-            let mask = f32x4::splat(f32::from_bits(!(SLOTS.next_power_of_two() as u32 - 1)));
-            best = best.fast_min((area & mask) | slots);
+            let first = 4 * block as u32;
+            let slots = u32x4::new([first, first + 1, first + 2, first + 3]);
+            let area: u32x4 = bytemuck::cast(area);
+            best = best.min((area & u32x4::splat(!SLOT)) | slots);
         }
-        let [a, b, c, d] = best.to_array().map(f32::to_bits);
-        let slot = a.min(b).min(c.min(d)) as usize & (SLOTS.next_power_of_two() - 1);
+        let [a, b, c, d] = best.to_array();
+        let slot = (a.min(b).min(c.min(d)) & SLOT) as usize;
         (place + slot + usize::from(slot >= RADIUS) - RADIUS) as u32
     }
 

@@ -148,6 +148,7 @@ impl<I: Input> Upper<'_, '_, I> {
                 .filter(|plane| plane.cost < cost)
             {
                 Some(plane) => {
+                    let known = self.pieces.pieces.len();
                     let sides = self.cut(&refs, plane, budget);
                     if sides
                         .iter()
@@ -155,6 +156,8 @@ impl<I: Input> Upper<'_, '_, I> {
                     {
                         sides
                     } else {
+                        // What was cut stays whole.
+                        self.pieces.pieces.truncate(known);
                         [left, right]
                     }
                 }
@@ -342,8 +345,9 @@ impl<I: Input> Upper<'_, '_, I> {
         above.min[axis] = at;
         let below = clip(corners, &below)?;
         let above = clip(corners, &above)?;
-        let below = self.pieces.put(Some(number), Piece { aabb: below, id });
-        let above = self.pieces.put(None, Piece { aabb: above, id });
+        // Not in the place of what is cut, which is as it was if the cut is given up.
+        let below = self.pieces.add_piece(Piece { aabb: below, id });
+        let above = self.pieces.add_piece(Piece { aabb: above, id });
         Some(
             [below, above]
                 .map(|number| Ref::new(&self.pieces.aabb(number), number).scaled(self.scale)),

@@ -5,7 +5,7 @@ use super::{Batch, Built, Chosen, Engine, Takes, timed};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::{cell::RefCell, error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
     simd::Backend,
@@ -25,13 +25,17 @@ pub fn engines(
 }
 
 /// Every way to build, by name. All make trees of 8-wide nodes.
-fn recipes() -> Vec<(&'static str, Builder)> {
-    vec![("wide-bvh 8", Builder::new())]
+fn recipes() -> Vec<(&'static str, Builder<'static>)> {
+    vec![
+        ("wide-bvh 8 Fast", Builder::preset(Preset::Fast)),
+        ("wide-bvh 8 Balanced", Builder::preset(Preset::Balanced)),
+        ("wide-bvh 8 Best", Builder::preset(Preset::Best)),
+    ]
 }
 
 /// Its builders.
 pub fn builders<'a>(mesh: &'a TriangleMesh<'_>) -> Vec<super::Builder<'a>> {
-    let builder = |(name, recipe): (&'static str, Builder)| super::Builder {
+    let builder = |(name, recipe): (&'static str, Builder<'static>)| super::Builder {
         name,
         build: Box::new(move |threads| {
             let (tree, built) = build::<Node8>(&recipe, mesh, threads)?;

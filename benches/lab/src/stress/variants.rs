@@ -5,10 +5,11 @@
 
 use super::flush::flushed;
 use wide_bvh::{
-    build::{BinaryTree, BuildError, Builder},
+    build::{BinaryTree, BuildError, Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{Bvh, Node4, Node8, Owned, Storage, TriangleLeaf, WideNode},
     simd::Backend,
+    traverse::Scratch,
 };
 
 /// An answer that is not brute force's.
@@ -25,14 +26,24 @@ pub struct Mismatch {
 /// How a hierarchy comes to be.
 struct Build {
     name: &'static str,
-    builder: fn() -> Builder,
+    builder: fn() -> Builder<'static>,
     from_tree: bool,
 }
 
-const BUILDS: [Build; 4] = [
+const BUILDS: [Build; 6] = [
     Build {
         name: "default build",
         builder: Builder::new,
+        from_tree: false,
+    },
+    Build {
+        name: "fast",
+        builder: || Builder::preset(Preset::Fast),
+        from_tree: false,
+    },
+    Build {
+        name: "balanced",
+        builder: || Builder::preset(Preset::Balanced),
         from_tree: false,
     },
     Build {
@@ -128,7 +139,7 @@ fn same_bytes<N: WideNode>(
     same(a.nodes(), b.nodes()) && same(a.leaves(), b.leaves()) && a.primitives() == b.primitives()
 }
 
-/// Every kind of call, over all rays. Batches belong here.
+/// Every kind of call, over all rays.
 fn ask<N: WideNode, S: Storage>(
     bvh: &Bvh<N, TriangleLeaf, S>,
     name: impl Fn() -> String,
@@ -155,6 +166,52 @@ fn ask<N: WideNode, S: Storage>(
             return Err(wrong(place, "closest_hit_counted", show(hit)));
         }
         checked += 3;
+    }
+    Ok(checked + ask_at_once(bvh, wrong, rays, expected)?)
+}
+
+/// Batches over all rays, and packets of eight.
+fn ask_at_once<N: WideNode, S: Storage>(
+    bvh: &Bvh<N, TriangleLeaf, S>,
+    wrong: impl Fn(usize, &str, String) -> Mismatch,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+) -> Result<u64, Mismatch> {
+    let mut hits = vec![None; rays.len()];
+    let mut occluded = vec![false; rays.len()];
+    let mut checked = 0;
+    let mut compare = |call: [&str; 2], first: usize, hits: &[Option<Hit>], any: &[bool]| {
+        for (lane, (&hit, &any)) in hits.iter().zip(any).enumerate() {
+            let place = first + lane;
+            let expected = expected[place];
+            if bits(hit) != bits(expected) {
+                return Err(wrong(place, call[0], show(hit)));
+            }
+            if any != expected.is_some() {
+                return Err(wrong(place, call[1], any.to_string()));
+            }
+            checked += 2;
+        }
+        Ok(())
+    };
+    bvh.closest_hits(rays, &mut hits);
+    bvh.any_hits(rays, &mut occluded);
+    compare(["closest_hits", "any_hits"], 0, &hits, &occluded)?;
+    let mut scratch = Scratch::<5>::new();
+    bvh.closest_hits_in(&mut scratch, rays, &mut hits);
+    bvh.any_hits_in(&mut scratch, rays, &mut occluded);
+    let call = ["closest_hits_in", "any_hits_in"];
+    compare(call, 0, &hits, &occluded)?;
+    for (packet, rays) in rays.chunks_exact(8).enumerate() {
+        let Some(rays) = rays.first_chunk::<8>() else {
+            continue;
+        };
+        let (hits, any) = (
+            bvh.closest_hit_packet(rays, 0xff),
+            bvh.any_hit_packet(rays, 0xff),
+        );
+        let call = ["closest_hit_packet", "any_hit_packet"];
+        compare(call, 8 * packet, &hits, &any)?;
     }
     Ok(checked)
 }
