@@ -1,6 +1,7 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
 mod engines;
+mod error;
 mod race;
 mod reference;
 
@@ -18,11 +19,13 @@ struct Args {
 #[derive(Subcommand)]
 enum Command {
     Race(race::Args),
+    Error(error::Args),
 }
 
 fn main() -> ExitCode {
     let outcome = match Args::parse().command {
         Command::Race(args) => race::run(&args),
+        Command::Error(args) => error::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,6 +6,7 @@
 mod bvh;
 mod embree;
 mod obvhs;
+mod parry;
 mod wide_bvh;
 
 use ::wide_bvh::geometry::{Hit, Ray, TriangleMesh};
@@ -62,6 +63,7 @@ pub fn all(mesh: &TriangleMesh<'_>) -> Result<Vec<Box<dyn Engine>>, Box<dyn Erro
     engines.extend(embree::engines(mesh)?);
     engines.extend(obvhs::engines(mesh));
     engines.push(bvh::engine(mesh));
+    engines.extend(parry::engine(mesh)?);
     Ok(engines)
 }
 

@@ -5,8 +5,8 @@
 //! the median of the rounds is the figure.
 
 mod record;
-mod table;
-mod workloads;
+pub mod table;
+pub mod workloads;
 
 use crate::{
     engines::{self, Batch, Engine},
@@ -26,7 +26,7 @@ use wide_bvh::{
     build::Builder,
     geometry::{Hit, TriangleMesh},
 };
-use wide_bvh_scenes::Mesh;
+use wide_bvh_scenes::{LoadError, Mesh};
 use workloads::{Query, Workload};
 
 /// Race this crate beside Embree, obvhs and bvh: single rays, one thread.
@@ -96,12 +96,7 @@ impl Effort {
 /// # Errors
 /// A scene that cannot be read, an engine that cannot be built, a JSON file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
-    let scenes = if args.scenes.is_empty() {
-        vec![wide_bvh_scenes::default_scene()]
-    } else {
-        let load = |path: &PathBuf| wide_bvh_scenes::load(path);
-        args.scenes.iter().map(load).collect::<Result<_, _>>()?
-    };
+    let scenes = load_scenes(&args.scenes)?;
     // Now, so that no minutes are spent on figures that cannot be written.
     let create =
         |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
@@ -128,6 +123,18 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         serde_json::to_writer_pretty(file, &records)?;
     }
     Ok(())
+}
+
+/// The meshes in `paths`; without any, a scene made by code.
+///
+/// # Errors
+/// A scene that cannot be read.
+pub fn load_scenes(paths: &[PathBuf]) -> Result<Vec<Mesh>, LoadError> {
+    if paths.is_empty() {
+        return Ok(vec![wide_bvh_scenes::default_scene()]);
+    }
+    let load = |path: &PathBuf| wide_bvh_scenes::load(path);
+    paths.iter().map(load).collect()
 }
 
 /// One scene: a record of each engine on each workload that has rays.

@@ -1,0 +1,478 @@
+//! The chart: time across, error up, both logarithmic; the less the better.
+
+use super::{
+    kernels,
+    labels::{self, Placed, Point, Rect},
+    record::Figures,
+    statistics::pareto_front,
+};
+use plotters::{
+    coord::{
+        Shift,
+        ranged1d::{DefaultFormatting, KeyPointHint},
+    },
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+use std::{error::Error, ops::Range};
+
+/// One variant's place in a panel.
+pub struct Dot {
+    pub variant: String,
+    /// Nanoseconds a ray.
+    pub time: f64,
+    /// 0 has a line of its own.
+    pub error: f64,
+}
+
+/// Wrong answers of each variant, in a million rays.
+pub fn wrong_answers(rows: &[(String, Figures)]) -> Vec<Dot> {
+    dots(rows, |figures| {
+        let wrong = figures.counts.lost + figures.counts.phantoms;
+        Some(wrong as f64 * 1e6 / figures.counts.rays as f64)
+    })
+}
+
+/// The 99.9th percentile of each variant's relative error of `t`.
+pub fn errors_of_t(rows: &[(String, Figures)]) -> Vec<Dot> {
+    dots(rows, |figures| {
+        figures.t_relative.map(|spread| spread.p99_9)
+    })
+}
+
+fn dots(rows: &[(String, Figures)], error: impl Fn(&Figures) -> Option<f64>) -> Vec<Dot> {
+    let dot = |(variant, figures): &(String, Figures)| {
+        Some(Dot {
+            variant: variant.clone(),
+            time: figures.ns_per_ray,
+            error: error(figures)?,
+        })
+    };
+    rows.iter().filter_map(dot).collect()
+}
+
+/// What belongs together has one colour and one marker.
+struct Family {
+    name: &'static str,
+    /// What the variants' names begin with.
+    prefix: &'static str,
+    colour: RGBColor,
+    marker: Marker,
+}
+
+#[derive(Clone, Copy)]
+enum Marker {
+    Disc,
+    Square,
+    Triangle,
+}
+
+/// Colours after Okabe and Ito, to be told apart by everyone.
+const FAMILIES: [Family; 7] = [
+    Family {
+        name: "wide-bvh",
+        prefix: "wide-bvh ",
+        colour: RGBColor(213, 94, 0),
+        marker: Marker::Disc,
+    },
+    Family {
+        name: "Embree",
+        prefix: "embree ",
+        colour: RGBColor(0, 114, 178),
+        marker: Marker::Disc,
+    },
+    Family {
+        name: "obvhs",
+        prefix: "obvhs ",
+        colour: RGBColor(204, 121, 167),
+        marker: Marker::Disc,
+    },
+    Family {
+        name: "parry3d",
+        prefix: "parry3d",
+        colour: RGBColor(230, 159, 0),
+        marker: Marker::Disc,
+    },
+    Family {
+        name: "bvh",
+        prefix: "bvh",
+        colour: RGBColor(86, 180, 233),
+        marker: Marker::Disc,
+    },
+    Family {
+        name: "box tests, in one plain traversal",
+        prefix: kernels::SLAB,
+        colour: RGBColor(90, 90, 90),
+        marker: Marker::Square,
+    },
+    Family {
+        name: "triangle tests, in the same",
+        prefix: kernels::TRIANGLE,
+        colour: RGBColor(0, 158, 115),
+        marker: Marker::Triangle,
+    },
+];
+
+/// Of what is in no family: a layout, a packet or a batch that came later and wants one.
+const NO_FAMILY: Family = Family {
+    name: "other",
+    prefix: "",
+    colour: BLACK,
+    marker: Marker::Disc,
+};
+
+fn family(variant: &str) -> &'static Family {
+    let is = |family: &&Family| variant.starts_with(family.prefix);
+    FAMILIES.iter().find(is).unwrap_or(&NO_FAMILY)
+}
+
+const WIDTH: u32 = 1000;
+const HEADER: u32 = 66;
+const PANELS: [u32; 2] = [600, 420];
+const FONT: &str = "sans-serif";
+/// In pixels; plotters' SVG makes fonts smaller by 1.24.
+const TEXT: f64 = 11.5;
+const LINE: f64 = 15.0;
+const INK: RGBColor = RGBColor(40, 40, 40);
+const FAINT: RGBColor = RGBColor(228, 228, 228);
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Outcome<T = ()> = Result<T, Box<dyn Error>>;
+
+fn text(size: f64) -> TextStyle<'static> {
+    (FONT, size * 1.24).into_font().color(&INK)
+}
+
+/// The two panels as an SVG.
+///
+/// # Errors
+/// It cannot be drawn.
+pub fn draw(wrong: &[Dot], t: &[Dot]) -> Outcome<String> {
+    let mut svg = String::new();
+    {
+        let height = HEADER + PANELS.iter().sum::<u32>();
+        let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let (header, panels) = root.split_vertically(HEADER);
+        let (upper, lower) = panels.split_vertically(PANELS[0]);
+        legend(&header, wrong)?;
+        panel(
+            &upper,
+            wrong,
+            "wrong answers in a million rays, all sets of rays",
+            plain,
+        )?;
+        panel(
+            &lower,
+            t,
+            "relative error of t, 99.9th percentile, scenes' own rays",
+            power,
+        )?;
+        root.present()?;
+    }
+    Ok(svg)
+}
+
+fn legend(area: &Area<'_>, dots: &[Dot]) -> Outcome {
+    let style = text(12.0).pos(Pos::new(HPos::Left, VPos::Center));
+    area.draw(&Text::new(
+        "Run time against error: towards the lower left is better",
+        (84, 18),
+        text(15.0).pos(Pos::new(HPos::Left, VPos::Center)),
+    ))?;
+    let mut x = 90;
+    for family in FAMILIES.iter().chain([&NO_FAMILY]) {
+        let is_one = |dot: &Dot| self::family(&dot.variant).name == family.name;
+        if !dots.iter().any(is_one) {
+            continue;
+        }
+        marker(area, [f64::from(x), 46.0], family)?;
+        area.draw(&Text::new(family.name, (x + 11, 46), style.clone()))?;
+        x += 11 + (family.name.len() as f64 * 6.4) as i32 + 24;
+    }
+    area.draw(&PathElement::new([(x, 46), (x + 24, 46)], front_style()))?;
+    area.draw(&Text::new("Pareto front", (x + 30, 46), style))?;
+    Ok(())
+}
+
+fn front_style() -> ShapeStyle {
+    BLACK.mix(0.4).stroke_width(3)
+}
+
+fn marker(area: &Area<'_>, [x, y]: Point, family: &Family) -> Outcome {
+    let (x, y) = (x.round() as i32, y.round() as i32);
+    let fill = family.colour.mix(0.9).filled();
+    match family.marker {
+        Marker::Disc => area.draw(&Circle::new((x, y), 5, fill))?,
+        Marker::Square => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill))?,
+        Marker::Triangle => {
+            let corners = [(x, y - 6), (x + 6, y + 5), (x - 6, y + 5)];
+            area.draw(&Polygon::new(corners, fill))?;
+        }
+    }
+    Ok(())
+}
+
+/// An axis of decimal logarithms, labelled where we say.
+struct Axis {
+    range: Range<f64>,
+    keys: Vec<f64>,
+}
+
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
+        let part = (value - self.range.start) / (self.range.end - self.range.start);
+        from + (part * f64::from(to - from)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() {
+            Vec::new()
+        } else {
+            self.keys.clone()
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+/// The axis of time: labelled at 1, 2 and 5 times powers of ten.
+fn time_axis(dots: &[Dot]) -> Axis {
+    let (least, most) = extent(dots.iter().map(|dot| dot.time));
+    let (least, most) = ((least * 0.8).log10(), (most * 1.25).log10());
+    let keys = (0..8).flat_map(|power| [1.0, 2.0, 5.0].map(|x: f64| x.log10() + f64::from(power)));
+    Axis {
+        keys: keys.filter(|key| (least..most).contains(key)).collect(),
+        range: least..most,
+    }
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, 0.0), |(least, most), value| {
+        (value.min(least), value.max(most))
+    })
+}
+
+/// Where errors are drawn.
+struct ErrorScale {
+    range: Range<f64>,
+    keys: Vec<f64>,
+    /// The line of zero, if a variant is on it.
+    zero: Option<f64>,
+}
+
+impl ErrorScale {
+    fn new(dots: &[Dot]) -> Self {
+        let (least, most) = extent(dots.iter().map(|dot| dot.error).filter(|&e| e > 0.0));
+        let (least, most) = if least > most {
+            (1.0, 1.0)
+        } else {
+            (least, most)
+        };
+        let (least, most) = (least.log10().floor(), most.log10());
+        let mut keys: Vec<f64> = (least as i32..=most as i32).map(f64::from).collect();
+        let has_zero = dots.iter().any(|dot| dot.error == 0.0);
+        let zero = has_zero.then_some(least - 0.9);
+        keys.extend(zero);
+        let span = (most - least).max(1.0);
+        // Below zero there is room for the labels of those that are on its line.
+        let low = zero.map_or(least.min(most - 1.0), |zero| zero - 0.45 * span);
+        Self {
+            range: low..most + 0.12 * span,
+            keys,
+            zero,
+        }
+    }
+
+    fn y(&self, error: f64) -> f64 {
+        match self.zero {
+            Some(zero) if error == 0.0 => zero,
+            _ => error.log10(),
+        }
+    }
+}
+
+fn plain(log: f64) -> String {
+    let number = 10_f64.powf(log);
+    if number < 0.999 {
+        format!("{number:.*}", (-log).ceil() as usize)
+    } else if number < 999.0 {
+        format!("{number:.0}")
+    } else {
+        format!("{:.0},000", number / 1e3)
+    }
+}
+
+fn power(log: f64) -> String {
+    format!("1e{log:.0}")
+}
+
+fn panel(area: &Area<'_>, dots: &[Dot], title: &str, number: fn(f64) -> String) -> Outcome {
+    if dots.is_empty() {
+        return Ok(());
+    }
+    let scale = ErrorScale::new(dots);
+    let errors = Axis {
+        range: scale.range.clone(),
+        keys: scale.keys.clone(),
+    };
+    let mut chart = ChartBuilder::on(area)
+        .margin_right(16)
+        .margin_left(6)
+        .margin_top(8)
+        .x_label_area_size(44)
+        .y_label_area_size(78)
+        .build_cartesian_2d(time_axis(dots), errors)?;
+    chart
+        .configure_mesh()
+        .bold_line_style(FAINT)
+        .light_line_style(TRANSPARENT)
+        .axis_style(INK)
+        .label_style(text(12.0))
+        .axis_desc_style(text(13.0))
+        .x_desc("nanoseconds a ray, one thread")
+        .y_desc(title)
+        .x_label_formatter(&|&x| plain(x))
+        .y_label_formatter(&|&y| {
+            if scale.zero == Some(y) {
+                "0".to_owned()
+            } else {
+                number(y)
+            }
+        })
+        .draw()?;
+    let (xs, ys) = chart.plotting_area().get_pixel_range();
+    let (left, top) = area.get_base_pixel();
+    let pixel = |x: f64, y: f64| -> Point {
+        let (x, y) = chart.backend_coord(&(x, y));
+        [f64::from(x - left), f64::from(y - top)]
+    };
+    let at = |dot: &Dot| pixel(dot.time.log10(), scale.y(dot.error));
+    let room = Rect {
+        min: [
+            f64::from(xs.start - left) + 4.0,
+            f64::from(ys.start - top) + 4.0,
+        ],
+        max: [
+            f64::from(xs.end - left) - 4.0,
+            f64::from(ys.end - top) - 4.0,
+        ],
+    };
+
+    let points: Vec<Point> = dots.iter().map(at).collect();
+    if let Some(zero) = scale.zero {
+        let [_, y] = pixel(dots[0].time.log10(), zero);
+        let ends = [room.min[0] - 4.0, room.max[0] + 4.0].map(|x| (x as i32, y as i32));
+        area.draw(&PathElement::new(ends, INK.mix(0.35).stroke_width(1)))?;
+    }
+    let front = front(dots, &points, room);
+    let path: Vec<(i32, i32)> = front.iter().map(|&p| rounded(p)).collect();
+    area.draw(&PathElement::new(path, front_style()))?;
+    let lines: Vec<[Point; 2]> = front.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+    for (dot, point) in dots.iter().zip(&points) {
+        marker(area, *point, family(&dot.variant))?;
+    }
+    let names: Vec<&str> = dots.iter().map(|dot| label(&dot.variant)).collect();
+    let sizes: Vec<Point> = names.iter().map(|name| size(name)).collect();
+    let placed = labels::place(&points, &sizes, room, &lines);
+    for ((dot, name), placed) in dots.iter().zip(names).zip(placed) {
+        if let Some(placed) = placed {
+            write_label(area, name, family(&dot.variant).colour, &placed)?;
+        }
+    }
+    Ok(())
+}
+
+/// The Pareto front as a staircase, from the top to the right.
+fn front(dots: &[Dot], points: &[Point], room: Rect) -> Vec<Point> {
+    let values: Vec<[f64; 2]> = dots.iter().map(|dot| [dot.time, dot.error]).collect();
+    let mut stairs: Vec<Point> = Vec::new();
+    for dot in pareto_front(&values) {
+        let [x, y] = points[dot];
+        let above = stairs.last().map_or(room.min[1], |last| last[1]);
+        stairs.extend([[x, above], [x, y]]);
+    }
+    if let Some(&[_, y]) = stairs.last() {
+        stairs.push([room.max[0] + 4.0, y]);
+    }
+    stairs
+}
+
+/// A variant's name without what its family's marker says.
+fn label(variant: &str) -> &str {
+    let lab = variant
+        .strip_prefix(kernels::SLAB)
+        .or_else(|| variant.strip_prefix(kernels::TRIANGLE));
+    lab.unwrap_or(variant)
+}
+
+/// About how large a label is.
+fn size(name: &str) -> Point {
+    [name.chars().count() as f64 * TEXT * 0.56 + 4.0, LINE]
+}
+
+fn write_label(area: &Area<'_>, name: &str, colour: RGBColor, placed: &Placed) -> Outcome {
+    if let Some([from, to]) = placed.leader {
+        let line = [rounded(from), rounded(to)];
+        area.draw(&PathElement::new(line, colour.mix(0.6).stroke_width(1)))?;
+    }
+    let Rect { min, max } = placed.rect;
+    let center = rounded([(min[0] + max[0]) / 2.0, (min[1] + max[1]) / 2.0]);
+    let colour = dark(colour);
+    let style = text(TEXT)
+        .color(&colour)
+        .pos(Pos::new(HPos::Center, VPos::Center));
+    area.draw(&Text::new(name.to_owned(), center, style))?;
+    Ok(())
+}
+
+/// Dark enough to read.
+fn dark(RGBColor(r, g, b): RGBColor) -> RGBColor {
+    let [r, g, b] = [r, g, b].map(|x| (f64::from(x) * 0.7) as u8);
+    RGBColor(r, g, b)
+}
+
+fn rounded([x, y]: Point) -> (i32, i32) {
+    (x.round() as i32, y.round() as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_variant_is_named_in_both_panels() {
+        let dots = |errors: [f64; 3]| {
+            let names = ["wide-bvh 8 avx2", "embree HIGH", "slab Ize"];
+            let dot = |(i, variant): (usize, &str)| Dot {
+                variant: variant.to_owned(),
+                time: 100.0 * (i + 1) as f64,
+                error: errors[i],
+            };
+            names.into_iter().enumerate().map(dot).collect::<Vec<_>>()
+        };
+        let svg = draw(&dots([0.0, 3.0, 2e4]), &dots([1e-7, 2e-7, 1e-3])).unwrap();
+        for name in ["wide-bvh 8 avx2", "embree HIGH", "Ize"] {
+            assert_eq!(
+                svg.lines().filter(|line| line.trim() == name).count(),
+                2,
+                "{name}"
+            );
+        }
+        assert!(svg.lines().any(|line| line.trim() == "10,000"));
+        assert!(svg.lines().any(|line| line.trim() == "0"));
+    }
+
+    #[test]
+    fn each_variant_has_its_family() {
+        assert_eq!(family("wide-bvh 8 avx2").name, "wide-bvh");
+        assert_eq!(family("bvh").name, "bvh");
+        assert_eq!(family("slab Ize").prefix, kernels::SLAB);
+        assert_eq!(family("a new one").name, "other");
+    }
+}

@@ -1,0 +1,333 @@
+//! Whether an answer is right.
+//!
+//! An answer is compared with the exact one:
+//!
+//! - *right*: both miss, or it names the triangle that is hit first, or one of several that are hit there together;
+//! - *other triangle*: it names another at the same distance, give or take [`T_ROUNDING`]: what happens at shared
+//!   edges, and where surfaces touch;
+//! - *lost*: it misses, or names something behind;
+//! - *phantom*: it hits where there is nothing, or names something nearer than what is there.
+//!
+//! Rays that pass an outline within rounding are lost, or hit, by the least rounding anywhere, and no float test
+//! can do better. So each lost ray and each phantom is looked at again: if the answer would be exactly right
+//! for a ray shifted sideways by at most [`SHIFT`], or whose range ends [`T_ROUNDING`] elsewhere, it is counted as one
+//! *at the edge*, apart from the others. The measure is backward error, the same for all variants. At an edge
+//! that two triangles share and that is no outline every shifted ray hits, too, so a ray lost there is lost.
+
+use super::truth::{ExactRay, First, Truth};
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+use std::{f64::consts::TAU, ops::AddAssign};
+use wide_bvh::geometry::{Hit, Ray};
+
+/// How far a shifted ray may be from the ray, relative to the largest distance, along an axis, of a corner of the
+/// triangles in question from the ray's origin.
+///
+/// A test in `f32` that moves corners to the ray's origin rounds each coordinate by u = 2^-24 of that. Woop's
+/// test rounds each of the two sheared coordinates seven times (shown in the crate's `src/slab`), √2·7 u together, and a
+/// hair for shifting in sixteen directions only.
+const SHIFT: f64 = 10.2 / 16_777_216.0;
+
+/// How far `t` may be off for an answer to be about the same place: 2^-17 of the same distance, over the
+/// largest component of the direction. It is the bound that this crate documents.
+const T_ROUNDING: f64 = 1.0 / 131_072.0;
+
+/// What an answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    Right,
+    OtherTriangle,
+    Lost { at_edge: bool },
+    Phantom { at_edge: bool },
+}
+
+/// How many answers are what.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// All rays.
+    pub rays: usize,
+    /// The exact answer hits, and the variant misses or names something behind.
+    pub lost: usize,
+    /// Of further lost rays: right for a ray beside it, within rounding.
+    pub lost_at_edge: usize,
+    /// The variant hits where there is nothing.
+    pub phantoms: usize,
+    /// Of further phantoms: right for a ray beside it, within rounding.
+    pub phantoms_at_edge: usize,
+    /// Another triangle than that hit first, at the same distance.
+    pub other_triangle: usize,
+}
+
+impl Counts {
+    pub fn add(&mut self, verdict: Verdict) {
+        self.rays += 1;
+        *match verdict {
+            Verdict::Right => return,
+            Verdict::OtherTriangle => &mut self.other_triangle,
+            Verdict::Lost { at_edge: false } => &mut self.lost,
+            Verdict::Lost { at_edge: true } => &mut self.lost_at_edge,
+            Verdict::Phantom { at_edge: false } => &mut self.phantoms,
+            Verdict::Phantom { at_edge: true } => &mut self.phantoms_at_edge,
+        } += 1;
+    }
+}
+
+impl AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.lost += other.lost;
+        self.lost_at_edge += other.lost_at_edge;
+        self.phantoms += other.phantoms;
+        self.phantoms_at_edge += other.phantoms_at_edge;
+        self.other_triangle += other.other_triangle;
+    }
+}
+
+/// What `answer` is, `first` being the exact one.
+pub fn judge(truth: &Truth<'_>, ray: &Ray, first: Option<&First>, answer: Option<&Hit>) -> Verdict {
+    let lost = match (first, answer) {
+        (None, None) => return Verdict::Right,
+        (Some(first), Some(hit)) if first.triangles.contains(&hit.primitive) => {
+            return Verdict::Right;
+        }
+        (Some(_), None) => true,
+        (None, Some(_)) => false,
+        (Some(first), Some(hit)) => {
+            let scale = Scale::new(truth, ray, Some(first), Some(hit));
+            let behind = f64::from(hit.t) - first.t;
+            if behind.abs() <= scale.t_rounding {
+                return Verdict::OtherTriangle;
+            }
+            behind > 0.0
+        }
+    };
+    let at_edge = at_edge(truth, ray, first, answer);
+    if lost {
+        Verdict::Lost { at_edge }
+    } else {
+        Verdict::Phantom { at_edge }
+    }
+}
+
+/// What rounding comes to.
+struct Scale {
+    shift: f64,
+    t_rounding: f64,
+}
+
+impl Scale {
+    fn new(truth: &Truth<'_>, ray: &Ray, first: Option<&First>, answer: Option<&Hit>) -> Self {
+        let triangles = first.map(|first| first.triangles[0]);
+        let largest = triangles
+            .into_iter()
+            .chain(answer.map(|hit| hit.primitive))
+            .flat_map(|triangle| truth.corners(triangle))
+            .map(|corner| {
+                (corner.as_dvec3() - ray.origin.as_dvec3())
+                    .abs()
+                    .max_element()
+            })
+            .fold(0.0, f64::max);
+        Self {
+            shift: SHIFT * largest,
+            t_rounding: T_ROUNDING * largest / f64::from(ray.direction.abs().max_element()),
+        }
+    }
+}
+
+/// Whether the answer is right for a ray beside `ray`.
+fn at_edge(truth: &Truth<'_>, ray: &Ray, first: Option<&First>, answer: Option<&Hit>) -> bool {
+    let scale = Scale::new(truth, ray, first, answer);
+    let is_right = |ray: ExactRay| match (truth.first(&ray), answer) {
+        (None, None) => true,
+        (Some(first), Some(hit)) => (first.t - f64::from(hit.t)).abs() <= scale.t_rounding,
+        _ => false,
+    };
+    let exact = ExactRay::from(ray);
+    let [least, most] = exact.range;
+    let rounding = scale.t_rounding;
+    let mut ranges = vec![exact.range];
+    let times = first.map(|first| first.t).into_iter();
+    let times = times.chain(answer.map(|hit| f64::from(hit.t)));
+    let near_end = |t: f64| {
+        [least, most]
+            .map(|end| (t - end).abs())
+            .into_iter()
+            .any(|off| off <= 2.0 * rounding)
+    };
+    if times.into_iter().any(near_end) {
+        ranges.push([least + rounding, most - rounding]);
+        ranges.push([least - rounding, most + rounding]);
+    }
+    let onto_answer = answer.map_or_else(Vec::new, |hit| {
+        shifts_onto(
+            truth.corners(hit.primitive),
+            &exact,
+            f64::from(hit.t),
+            scale.shift,
+        )
+    });
+    let around = sideways(exact.direction)
+        .flat_map(|way| [0.25, 0.5, 1.0].map(|part| way * (part * scale.shift)));
+    [DVec3::ZERO]
+        .into_iter()
+        .chain(onto_answer)
+        .chain(around)
+        .any(|shift| {
+            let origin = exact.origin + shift;
+            let shifted = |&range: &[f64; 2]| ExactRay {
+                origin,
+                range,
+                ..exact
+            };
+            ranges.iter().map(shifted).any(is_right)
+        })
+}
+
+/// Shifts of at most `limit` that bring a ray's point at `t` onto a triangle, if there are any. On one that is seen
+/// nearly edge-on the least shift moves the hit far, so those around it would not find it.
+fn shifts_onto(corners: [Vec3; 3], ray: &ExactRay, t: f64, limit: f64) -> Vec<DVec3> {
+    let corners = corners.map(|corner| corner.as_dvec3());
+    let [a, b, c] = corners;
+    let point = ray.origin + ray.direction * t;
+    let closest = closest_point(corners, point);
+    let inwards = ((a + b + c) / 3.0 - closest).normalize_or_zero();
+    // A little further in, for the shift is rounded, too.
+    [1e-4, 1e-2, 0.1]
+        .map(|part| closest + inwards * (part * limit) - point)
+        .map(|shift| shift.reject_from(ray.direction))
+        .into_iter()
+        .filter(|shift| shift.length() <= limit)
+        .collect()
+}
+
+/// The point of a triangle that is closest to a point.
+fn closest_point([a, b, c]: [DVec3; 3], point: DVec3) -> DVec3 {
+    let normal = (b - a).cross(c - a);
+    let foot = point - (point - a).project_onto(normal);
+    let edges = [(a, b), (b, c), (c, a)];
+    if edges
+        .iter()
+        .all(|&(p, q)| (q - p).cross(foot - p).dot(normal) >= 0.0)
+    {
+        return foot;
+    }
+    let on_edge = edges.map(|(p, q)| {
+        let along = (point - p).dot(q - p) / (q - p).length_squared();
+        p.lerp(q, along.clamp(0.0, 1.0))
+    });
+    let [first, others @ ..] = on_edge;
+    others.into_iter().fold(first, |best, other| {
+        if other.distance_squared(point) < best.distance_squared(point) {
+            other
+        } else {
+            best
+        }
+    })
+}
+
+/// Sixteen unit vectors across a direction.
+fn sideways(direction: DVec3) -> impl Iterator<Item = DVec3> {
+    let (x, y) = direction.normalize().any_orthonormal_pair();
+    (0..16).map(move |i| {
+        let (sin, cos) = (TAU / 16.0 * f64::from(i)).sin_cos();
+        cos * x + sin * y
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wide_bvh::{build::Builder, geometry::TriangleMesh};
+
+    /// Two squares, one behind the other: at z = 1 from 0 to 1, at z = 2 from -1 to 2.
+    const POSITIONS: [[f32; 3]; 8] = [
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [-1.0, -1.0, 2.0],
+        [2.0, -1.0, 2.0],
+        [2.0, 2.0, 2.0],
+        [-1.0, 2.0, 2.0],
+    ];
+    const INDICES: [[u32; 3]; 4] = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+
+    fn verdict(x: f32, y: f32, answer: Option<(f32, u32)>) -> Verdict {
+        let mesh = TriangleMesh::new(&POSITIONS, &INDICES).unwrap();
+        let bvh = Builder::new().build(&mesh).unwrap();
+        let truth = Truth::new(mesh, &bvh);
+        let ray = Ray::new([x, y, 0.0], [0.0, 0.0, 1.0]);
+        let first = truth.first(&ExactRay::from(&ray));
+        let answer = answer.map(|(t, primitive)| Hit {
+            t,
+            u: 0.0,
+            v: 0.0,
+            primitive,
+        });
+        judge(&truth, &ray, first.as_ref(), answer.as_ref())
+    }
+
+    const LOST: Verdict = Verdict::Lost { at_edge: false };
+    const PHANTOM: Verdict = Verdict::Phantom { at_edge: false };
+
+    #[test]
+    fn in_the_open_there_is_no_mercy() {
+        assert_eq!(verdict(0.75, 0.25, Some((1.0, 0))), Verdict::Right);
+        assert_eq!(verdict(0.75, 0.25, None), LOST);
+        assert_eq!(verdict(0.75, 0.25, Some((2.0, 2))), LOST);
+        assert_eq!(verdict(0.75, 0.25, Some((0.5, 1))), PHANTOM);
+        assert_eq!(verdict(5.0, 5.0, Some((2.0, 2))), PHANTOM);
+        assert_eq!(verdict(5.0, 5.0, None), Verdict::Right);
+    }
+
+    #[test]
+    fn at_the_diagonal_either_will_do_but_none_will_not() {
+        for triangle in [0, 1] {
+            assert_eq!(verdict(0.5, 0.5, Some((1.0, triangle))), Verdict::Right);
+        }
+        assert_eq!(
+            verdict(0.500_000_1, 0.5, Some((1.0, 1))),
+            Verdict::OtherTriangle
+        );
+        assert_eq!(verdict(0.5, 0.5, Some((2.0, 2))), LOST);
+    }
+
+    #[test]
+    fn at_the_outline_within_rounding_is_counted_apart() {
+        let at_edge = true;
+        assert_eq!(
+            verdict(1e-8, 0.3, Some((2.0, 3))),
+            Verdict::Lost { at_edge }
+        );
+        assert_eq!(
+            verdict(-1e-8, 0.3, Some((1.0, 1))),
+            Verdict::Phantom { at_edge }
+        );
+        assert_eq!(verdict(1e-5, 0.3, Some((2.0, 3))), LOST);
+        assert_eq!(verdict(-1e-5, 0.3, Some((1.0, 1))), PHANTOM);
+    }
+
+    #[test]
+    fn the_closest_point_of_a_triangle_is_inside_on_an_edge_or_a_corner() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for (point, closest) in [
+            ([0.25, 0.25, 3.0], [0.25, 0.25, 0.0]),
+            ([0.5, -1.0, 1.0], [0.5, 0.0, 0.0]),
+            ([1.0, 1.0, 0.0], [0.5, 0.5, 0.0]),
+            ([-1.0, -2.0, 5.0], [0.0; 3]),
+        ] {
+            let found = closest_point(corners, point.into());
+            assert!(found.distance(closest.into()) < 1e-12, "{found}");
+        }
+    }
+
+    #[test]
+    fn counts_add_up() {
+        let mut counts = Counts::default();
+        counts.add(LOST);
+        counts.add(Verdict::Right);
+        counts += counts;
+        assert_eq!((counts.rays, counts.lost, counts.phantoms), (4, 2, 0));
+    }
+}
