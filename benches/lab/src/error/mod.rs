@@ -6,7 +6,6 @@
 mod chart;
 mod judge;
 mod kernels;
-mod labels;
 mod measure;
 mod rays;
 mod record;

@@ -1,20 +1,19 @@
 //! The chart: time across, error up, both logarithmic; the less the better.
 
-use super::{
-    kernels,
-    labels::{self, Placed, Point, Rect},
-    record::Figures,
-    statistics::pareto_front,
-};
+mod axis;
+mod family;
+mod labels;
+
+use super::{kernels, record::Figures, statistics::pareto_front};
+use axis::{ErrorScale, plain, power, time_axis};
+use family::{family, marker};
+use labels::{Placed, Point, Rect};
 use plotters::{
-    coord::{
-        Shift,
-        ranged1d::{DefaultFormatting, KeyPointHint},
-    },
+    coord::Shift,
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
 };
-use std::{error::Error, ops::Range};
+use std::error::Error;
 
 /// One variant's place in a panel.
 pub struct Dot {
@@ -49,81 +48,6 @@ fn dots(rows: &[(String, Figures)], error: impl Fn(&Figures) -> Option<f64>) -> 
         })
     };
     rows.iter().filter_map(dot).collect()
-}
-
-/// What belongs together has one colour and one marker.
-struct Family {
-    name: &'static str,
-    /// What the variants' names begin with.
-    prefix: &'static str,
-    colour: RGBColor,
-    marker: Marker,
-}
-
-#[derive(Clone, Copy)]
-enum Marker {
-    Disc,
-    Square,
-    Triangle,
-}
-
-/// Colours after Okabe and Ito, to be told apart by everyone.
-const FAMILIES: [Family; 7] = [
-    Family {
-        name: "wide-bvh",
-        prefix: "wide-bvh ",
-        colour: RGBColor(213, 94, 0),
-        marker: Marker::Disc,
-    },
-    Family {
-        name: "Embree",
-        prefix: "embree ",
-        colour: RGBColor(0, 114, 178),
-        marker: Marker::Disc,
-    },
-    Family {
-        name: "obvhs",
-        prefix: "obvhs ",
-        colour: RGBColor(204, 121, 167),
-        marker: Marker::Disc,
-    },
-    Family {
-        name: "parry3d",
-        prefix: "parry3d",
-        colour: RGBColor(230, 159, 0),
-        marker: Marker::Disc,
-    },
-    Family {
-        name: "bvh",
-        prefix: "bvh",
-        colour: RGBColor(86, 180, 233),
-        marker: Marker::Disc,
-    },
-    Family {
-        name: "box tests, in one plain traversal",
-        prefix: kernels::SLAB,
-        colour: RGBColor(90, 90, 90),
-        marker: Marker::Square,
-    },
-    Family {
-        name: "triangle tests, in the same",
-        prefix: kernels::TRIANGLE,
-        colour: RGBColor(0, 158, 115),
-        marker: Marker::Triangle,
-    },
-];
-
-/// Of what is in no family: a layout, a packet or a batch that came later and wants one.
-const NO_FAMILY: Family = Family {
-    name: "other",
-    prefix: "",
-    colour: BLACK,
-    marker: Marker::Disc,
-};
-
-fn family(variant: &str) -> &'static Family {
-    let is = |family: &&Family| variant.starts_with(family.prefix);
-    FAMILIES.iter().find(is).unwrap_or(&NO_FAMILY)
 }
 
 const WIDTH: u32 = 1000;
@@ -181,8 +105,8 @@ fn legend(area: &Area<'_>, dots: &[Dot]) -> Outcome {
         text(15.0).pos(Pos::new(HPos::Left, VPos::Center)),
     ))?;
     let mut x = 90;
-    for family in FAMILIES.iter().chain([&NO_FAMILY]) {
-        let is_one = |dot: &Dot| self::family(&dot.variant).name == family.name;
+    for family in family::all() {
+        let is_one = |dot: &Dot| family::family(&dot.variant).name == family.name;
         if !dots.iter().any(is_one) {
             continue;
         }
@@ -199,135 +123,18 @@ fn front_style() -> ShapeStyle {
     BLACK.mix(0.4).stroke_width(3)
 }
 
-fn marker(area: &Area<'_>, [x, y]: Point, family: &Family) -> Outcome {
-    let (x, y) = (x.round() as i32, y.round() as i32);
-    let fill = family.colour.mix(0.9).filled();
-    match family.marker {
-        Marker::Disc => area.draw(&Circle::new((x, y), 5, fill))?,
-        Marker::Square => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill))?,
-        Marker::Triangle => {
-            let corners = [(x, y - 6), (x + 6, y + 5), (x - 6, y + 5)];
-            area.draw(&Polygon::new(corners, fill))?;
-        }
-    }
-    Ok(())
-}
-
-/// An axis of decimal logarithms, labelled where we say.
-struct Axis {
-    range: Range<f64>,
-    keys: Vec<f64>,
-}
-
-impl Ranged for Axis {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let part = (value - self.range.start) / (self.range.end - self.range.start);
-        from + (part * f64::from(to - from)).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            Vec::new()
-        } else {
-            self.keys.clone()
-        }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.range.clone()
-    }
-}
-
-/// The axis of time: labelled at 1, 2 and 5 times powers of ten.
-fn time_axis(dots: &[Dot]) -> Axis {
-    let (least, most) = extent(dots.iter().map(|dot| dot.time));
-    let (least, most) = ((least * 0.8).log10(), (most * 1.25).log10());
-    let keys = (0..8).flat_map(|power| [1.0, 2.0, 5.0].map(|x: f64| x.log10() + f64::from(power)));
-    Axis {
-        keys: keys.filter(|key| (least..most).contains(key)).collect(),
-        range: least..most,
-    }
-}
-
-fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, 0.0), |(least, most), value| {
-        (value.min(least), value.max(most))
-    })
-}
-
-/// Where errors are drawn.
-struct ErrorScale {
-    range: Range<f64>,
-    keys: Vec<f64>,
-    /// The line of zero, if a variant is on it.
-    zero: Option<f64>,
-}
-
-impl ErrorScale {
-    fn new(dots: &[Dot]) -> Self {
-        let (least, most) = extent(dots.iter().map(|dot| dot.error).filter(|&e| e > 0.0));
-        let (least, most) = if least > most {
-            (1.0, 1.0)
-        } else {
-            (least, most)
-        };
-        let (least, most) = (least.log10().floor(), most.log10());
-        let mut keys: Vec<f64> = (least as i32..=most as i32).map(f64::from).collect();
-        let has_zero = dots.iter().any(|dot| dot.error == 0.0);
-        let zero = has_zero.then_some(least - 0.9);
-        keys.extend(zero);
-        let span = (most - least).max(1.0);
-        // Below zero there is room for the labels of those that are on its line.
-        let low = zero.map_or(least.min(most - 1.0), |zero| zero - 0.45 * span);
-        Self {
-            range: low..most + 0.12 * span,
-            keys,
-            zero,
-        }
-    }
-
-    fn y(&self, error: f64) -> f64 {
-        match self.zero {
-            Some(zero) if error == 0.0 => zero,
-            _ => error.log10(),
-        }
-    }
-}
-
-fn plain(log: f64) -> String {
-    let number = 10_f64.powf(log);
-    if number < 0.999 {
-        format!("{number:.*}", (-log).ceil() as usize)
-    } else if number < 999.0 {
-        format!("{number:.0}")
-    } else {
-        format!("{:.0},000", number / 1e3)
-    }
-}
-
-fn power(log: f64) -> String {
-    format!("1e{log:.0}")
-}
-
 fn panel(area: &Area<'_>, dots: &[Dot], title: &str, number: fn(f64) -> String) -> Outcome {
     if dots.is_empty() {
         return Ok(());
     }
     let scale = ErrorScale::new(dots);
-    let errors = Axis {
-        range: scale.range.clone(),
-        keys: scale.keys.clone(),
-    };
     let mut chart = ChartBuilder::on(area)
         .margin_right(16)
         .margin_left(6)
         .margin_top(8)
         .x_label_area_size(44)
         .y_label_area_size(78)
-        .build_cartesian_2d(time_axis(dots), errors)?;
+        .build_cartesian_2d(time_axis(dots), scale.axis())?;
     chart
         .configure_mesh()
         .bold_line_style(FAINT)
@@ -466,13 +273,5 @@ mod tests {
         }
         assert!(svg.lines().any(|line| line.trim() == "10,000"));
         assert!(svg.lines().any(|line| line.trim() == "0"));
-    }
-
-    #[test]
-    fn each_variant_has_its_family() {
-        assert_eq!(family("wide-bvh 8 avx2").name, "wide-bvh");
-        assert_eq!(family("bvh").name, "bvh");
-        assert_eq!(family("slab Ize").prefix, kernels::SLAB);
-        assert_eq!(family("a new one").name, "other");
     }
 }
