@@ -7,9 +7,9 @@ use crate::race::table::align;
 pub const LEGEND: &str = "\
 ns: nanoseconds a ray, in the quickest of the rounds; over several scenes their geometric mean. One thread.
 lost: the exact answer hits, the variant misses or names something behind. phantom: it hits what is not there.
-edge: further ones, right for a ray shifted sideways by less than what rounding a triangle to the ray comes to:
-  rays that pass an outline so closely that float tests may decide either way. other: another triangle than the
-  first, at the same distance. leaks: rays from inside a closed mesh that hit nothing.
+edge: further ones, where an outline passes the ray closer than what rounding a triangle to the ray comes to, 6e-7 of
+  its distance: float tests may decide either way. other: another triangle than the first, at the same distance.
+leaks: rays from inside a closed mesh that hit nothing.
 t ulp, t rel, uv: errors of right answers: median / 99.9th percentile / worst.
 slab …, triangle …: one traversal of the lab's own, over wide-bvh's tree, that differs in this test alone; comparable
   among themselves. Their other test is Woop's with its f64 step, or this crate's slab with fma.";

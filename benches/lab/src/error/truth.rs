@@ -219,6 +219,16 @@ fn cross(p: &WholeVector, q: &WholeVector) -> WholeVector {
 pub struct Truth<'a> {
     mesh: TriangleMesh<'a>,
     bvh: &'a Bvh8,
+    /// The triangles at each position, in order.
+    at: Vec<(Position, u32)>,
+}
+
+/// A position's bits.
+type Position = [u32; 3];
+
+fn position(corner: Vec3) -> Position {
+    // Adding 0 turns -0 into 0.
+    corner.to_array().map(|x| (x + 0.0).to_bits())
 }
 
 /// By how much boxes are widened, relative to the largest coordinate that there is.
@@ -227,7 +237,13 @@ const WIDENED: f64 = 1e-5;
 impl<'a> Truth<'a> {
     /// Of `mesh`, which `bvh` was built on.
     pub fn new(mesh: TriangleMesh<'a>, bvh: &'a Bvh8) -> Self {
-        Self { mesh, bvh }
+        let triangles = (0..mesh.len()).filter_map(|triangle| mesh.triangle(triangle));
+        let corners = triangles
+            .zip(0..)
+            .flat_map(|(corners, triangle)| corners.map(|corner| (position(corner), triangle)));
+        let mut at: Vec<_> = corners.collect();
+        at.sort_unstable();
+        Self { mesh, bvh, at }
     }
 
     /// Where the ray meets triangle number `triangle`.
@@ -242,8 +258,24 @@ impl<'a> Truth<'a> {
             .expect("a triangle of the mesh")
     }
 
+    /// The triangles that have a corner where `corner` is.
+    pub fn triangles_at(&self, corner: Vec3) -> impl Iterator<Item = u32> {
+        let position = position(corner);
+        let start = self.at.partition_point(|&(other, _)| other < position);
+        let there = move |entry: &&(Position, u32)| entry.0 == position;
+        self.at[start..]
+            .iter()
+            .take_while(there)
+            .map(|&(_, triangle)| triangle)
+    }
+
     /// The first hit within the ray's range.
     pub fn first(&self, ray: &ExactRay) -> Option<First> {
+        self.first_without(ray, &[])
+    }
+
+    /// The first hit within the ray's range if some triangles were not there.
+    pub fn first_without(&self, ray: &ExactRay, left_out: &[u32]) -> Option<First> {
         let mut first = None;
         let mut stack = vec![(f64::NEG_INFINITY, self.bvh.root())];
         let slabs = Slabs::new(ray, self.bvh.bounds());
@@ -270,7 +302,10 @@ impl<'a> Truth<'a> {
                 ChildKind::Leaf(index) => {
                     let places = self.bvh.leaves()[index].primitives();
                     for place in places {
-                        self.meet(ray, self.bvh.primitives()[place as usize], &mut first);
+                        let triangle = self.bvh.primitives()[place as usize];
+                        if !left_out.contains(&triangle) {
+                            self.meet(ray, triangle, &mut first);
+                        }
                     }
                 }
             }

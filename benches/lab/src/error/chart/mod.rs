@@ -112,7 +112,7 @@ fn legend(area: &Area<'_>, dots: &[Dot]) -> Outcome {
         }
         marker(area, [f64::from(x), 46.0], family)?;
         area.draw(&Text::new(family.name, (x + 11, 46), style.clone()))?;
-        x += 11 + (family.name.len() as f64 * 6.4) as i32 + 24;
+        x += 11 + (family.name.len() as f64 * 5.9) as i32 + 27;
     }
     area.draw(&PathElement::new([(x, 46), (x + 24, 46)], front_style()))?;
     area.draw(&Text::new("Pareto front", (x + 30, 46), style))?;

@@ -1,75 +1,132 @@
-//! Whether an answer is right for some ray beside the one that was traced.
+//! Whether a wrong answer is excused: whether what it overlooks ends, or what it names begins, within rounding of the ray.
 
 use super::Scale;
 use crate::error::truth::{ExactRay, First, Truth};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::f64::consts::TAU;
 use wide_bvh::geometry::{Hit, Ray};
 
-/// Whether the answer is right for a ray beside `ray`.
-pub fn at_edge(truth: &Truth<'_>, ray: &Ray, first: Option<&First>, answer: Option<&Hit>) -> bool {
-    let scale = Scale::new(truth, ray, first, answer);
-    let is_right = |ray: ExactRay| match (truth.first(&ray), answer) {
-        (None, None) => true,
-        (Some(first), Some(hit)) => (first.t - f64::from(hit.t)).abs() <= scale.t_rounding,
-        _ => false,
-    };
+/// Whether the point where an answer says that the ray hits is on its triangle, within rounding.
+pub fn is_there(truth: &Truth<'_>, ray: &Ray, hit: &Hit) -> bool {
+    let scale = Scale::new(truth, ray, [Some(hit.primitive), None]);
+    let corners = truth.corners(hit.primitive).map(|corner| corner.as_dvec3());
+    let direction = ray.direction.as_dvec3();
+    let point = ray.origin.as_dvec3() + direction * f64::from(hit.t);
+    let off = closest_point(corners, point) - point;
+    off.reject_from(direction).length() <= scale.shift
+        && off.project_onto(direction).length() <= scale.t_rounding * direction.length()
+}
+
+/// Whether each triangle that the ray hits in front of the answer ends right beside it, or is hit right at an end of its
+/// range.
+pub fn may_overlook(truth: &Truth<'_>, ray: &Ray, answer: Option<&Hit>) -> bool {
     let exact = ExactRay::from(ray);
-    let [least, most] = exact.range;
-    let rounding = scale.t_rounding;
-    let mut ranges = vec![exact.range];
-    let times = first.map(|first| first.t).into_iter();
-    let times = times.chain(answer.map(|hit| f64::from(hit.t)));
-    let near_end = |t: f64| {
-        [least, most]
-            .map(|end| (t - end).abs())
-            .into_iter()
-            .any(|off| off <= 2.0 * rounding)
-    };
-    if times.into_iter().any(near_end) {
-        ranges.push([least + rounding, most - rounding]);
-        ranges.push([least - rounding, most + rounding]);
+    let mut overlooked = Vec::new();
+    while let Some(First { t, triangles }) = truth.first_without(&exact, &overlooked) {
+        if answer.is_some_and(|hit| t > f64::from(hit.t)) {
+            break;
+        }
+        for &triangle in &triangles {
+            let scale = Scale::new(
+                truth,
+                ray,
+                [Some(triangle), answer.map(|hit| hit.primitive)],
+            );
+            let until = answer.map_or(f64::INFINITY, |hit| f64::from(hit.t) - scale.t_rounding);
+            let at_end = |end: &f64| (t - end).abs() <= scale.t_rounding;
+            if t < until
+                && !exact.range.iter().any(at_end)
+                && !ends_beside(truth, &exact, triangle, scale.shift, until)
+            {
+                return false;
+            }
+        }
+        overlooked.extend(triangles);
     }
-    let onto_answer = answer.map_or_else(Vec::new, |hit| {
-        shifts_onto(
-            truth.corners(hit.primitive),
-            &exact,
-            f64::from(hit.t),
-            scale.shift,
-        )
-    });
-    let around = sideways(exact.direction)
-        .flat_map(|way| [0.25, 0.5, 1.0].map(|part| way * (part * scale.shift)));
-    [DVec3::ZERO]
+    true
+}
+
+/// Whether a shift of at most `limit` takes the ray off a triangle and off what goes on from it there, up to `until`.
+///
+/// What goes on are triangles that share an edge with it, and those that share a corner near the ray. Triangles that
+/// only touch it, or meet it in the middle of an edge, do not: rounding moves them apart.
+fn ends_beside(truth: &Truth<'_>, ray: &ExactRay, triangle: u32, limit: f64, until: f64) -> bool {
+    let surface = surface_around(truth, ray, triangle, limit);
+    let range = [ray.range[0], until];
+    let is_off = |shift: DVec3| {
+        let origin = ray.origin + shift;
+        let shifted = ExactRay {
+            origin,
+            range,
+            ..*ray
+        };
+        let missed = |&triangle: &u32| truth.hit(&shifted, triangle).is_none();
+        shift.length() <= limit && surface.iter().all(missed)
+    };
+    let over_edges = surface
+        .iter()
+        .flat_map(|&triangle| shifts_over_edges(truth, ray, triangle, limit));
+    over_edges
+        .chain(shifts_around(ray.direction, limit))
+        .any(is_off)
+}
+
+/// A triangle, those that share an edge with it, and those that share a corner of it that is near the ray.
+fn surface_around(truth: &Truth<'_>, ray: &ExactRay, triangle: u32, limit: f64) -> Vec<u32> {
+    let corners = truth.corners(triangle);
+    let mut surface = Vec::new();
+    let mut at_other_corners = Vec::new();
+    for corner in corners {
+        let off = (corner.as_dvec3() - ray.origin).reject_from(ray.direction);
+        for other in truth.triangles_at(corner) {
+            if off.length() <= 2.0 * limit || at_other_corners.contains(&other) {
+                surface.push(other);
+            }
+            at_other_corners.push(other);
+        }
+    }
+    surface.push(triangle);
+    surface.sort_unstable();
+    surface.dedup();
+    surface
+}
+
+/// How far beyond an edge a shift goes, in parts of the greatest: it is rounded itself, and the strip between two outlines
+/// may be narrow.
+const BEYOND: [f64; 4] = [1e-6, 1e-4, 1e-2, 0.1];
+
+/// Shifts that take a ray just over an edge of a triangle.
+fn shifts_over_edges(
+    truth: &Truth<'_>,
+    ray: &ExactRay,
+    triangle: u32,
+    limit: f64,
+) -> impl Iterator<Item = DVec3> {
+    let [a, b, c] = truth.corners(triangle).map(|corner| corner.as_dvec3());
+    let direction = ray.direction;
+    let origin = ray.origin;
+    [(a, b, c), (b, c, a), (c, a, b)]
         .into_iter()
-        .chain(onto_answer)
-        .chain(around)
-        .any(|shift| {
-            let origin = exact.origin + shift;
-            let shifted = |&range: &[f64; 2]| ExactRay {
-                origin,
-                range,
-                ..exact
+        .flat_map(move |(a, b, opposite)| {
+            // Across the edge and the ray, away from the third corner.
+            let out = direction.cross(b - a).normalize_or_zero();
+            let out = if out.dot(opposite - a) > 0.0 {
+                -out
+            } else {
+                out
             };
-            ranges.iter().map(shifted).any(is_right)
+            let distance = out.dot(a - origin);
+            BEYOND.map(|part| out * (distance + part * limit))
         })
 }
 
-/// Shifts of at most `limit` that bring a ray's point at `t` onto a triangle, if there are any. On one that is seen
-/// nearly edge-on the least shift moves the hit far, so those around it would not find it.
-fn shifts_onto(corners: [Vec3; 3], ray: &ExactRay, t: f64, limit: f64) -> Vec<DVec3> {
-    let corners = corners.map(|corner| corner.as_dvec3());
-    let [a, b, c] = corners;
-    let point = ray.origin + ray.direction * t;
-    let closest = closest_point(corners, point);
-    let inwards = ((a + b + c) / 3.0 - closest).normalize_or_zero();
-    // A little further in, for the shift is rounded, too.
-    [1e-4, 1e-2, 0.1]
-        .map(|part| closest + inwards * (part * limit) - point)
-        .map(|shift| shift.reject_from(ray.direction))
-        .into_iter()
-        .filter(|shift| shift.length() <= limit)
-        .collect()
+/// Shifts in sixteen directions, and of three lengths.
+fn shifts_around(direction: DVec3, limit: f64) -> impl Iterator<Item = DVec3> {
+    let (x, y) = direction.normalize().any_orthonormal_pair();
+    (0..16).flat_map(move |i| {
+        let (sin, cos) = (TAU / 16.0 * f64::from(i)).sin_cos();
+        [0.25, 0.5, 1.0].map(|part| (cos * x + sin * y) * (part * limit))
+    })
 }
 
 /// The point of a triangle that is closest to a point.
@@ -94,15 +151,6 @@ fn closest_point([a, b, c]: [DVec3; 3], point: DVec3) -> DVec3 {
         } else {
             best
         }
-    })
-}
-
-/// Sixteen unit vectors across a direction.
-fn sideways(direction: DVec3) -> impl Iterator<Item = DVec3> {
-    let (x, y) = direction.normalize().any_orthonormal_pair();
-    (0..16).map(move |i| {
-        let (sin, cos) = (TAU / 16.0 * f64::from(i)).sin_cos();
-        cos * x + sin * y
     })
 }
 
