@@ -2,6 +2,7 @@
 
 mod effort;
 mod engines;
+mod error;
 mod exact;
 mod limit;
 mod race;
@@ -28,6 +29,7 @@ enum Command {
     Limit(limit::Args),
     Race(race::Args),
     Stress(stress::Args),
+    Error(error::Args),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         Command::Limit(args) => limit::run(&args),
         Command::Race(args) => race::run(&args),
         Command::Stress(args) => stress::run(&args),
+        Command::Error(args) => error::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

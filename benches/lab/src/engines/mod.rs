@@ -7,6 +7,7 @@
 mod bvh;
 mod embree;
 mod obvhs;
+mod parry;
 mod wide_bvh;
 
 use ::wide_bvh::geometry::{Hit, Ray, TriangleMesh};
@@ -83,6 +84,7 @@ pub fn all(
     engines.extend(embree::engines(mesh, chosen)?);
     engines.extend(obvhs::engines(mesh, chosen));
     engines.extend(bvh::engine(mesh, chosen));
+    engines.extend(parry::engine(mesh, chosen)?);
     Ok(engines)
 }
 
