@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use glam::Vec3;
 use std::hint::black_box;
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, Preset},
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{Bvh, Child, Node4, Node8, Owned, TriangleLeaf, WideNode},
     simd::Backend,
@@ -93,6 +93,13 @@ fn traversal(c: &mut Criterion) {
             group.bench_function(BenchmarkId::new(name("any hit"), backend.name()), |b| {
                 b.iter(|| rays.iter().filter(|ray| bvh.any_hit(ray)).count());
             });
+            let mut hits = vec![None; rays.len()];
+            group.bench_function(
+                BenchmarkId::new(name("closest hits"), backend.name()),
+                |b| {
+                    b.iter(|| bvh.closest_hits(black_box(rays), &mut hits));
+                },
+            );
         }
     }
     let mesh = shapes::torus_knot(2, 3, 0.3, 512, 64);
@@ -113,7 +120,11 @@ fn build(c: &mut Criterion) {
     let mut group = c.benchmark_group("build");
     group.sample_size(10);
     group.throughput(Throughput::Elements(mesh.len() as u64));
-    group.bench_function("8 wide", |b| b.iter(|| Builder::new().build(&mesh)));
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+        group.bench_function(format!("8 wide, {preset:?}"), |b| {
+            b.iter(|| Builder::preset(preset).build(&mesh))
+        });
+    }
     group.bench_function("4 wide", |b| {
         b.iter(|| Builder::new().build_as::<Node4>(&mesh))
     });

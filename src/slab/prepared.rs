@@ -165,7 +165,7 @@ impl<'a> PreparedRay<'a> {
 /// See [`PreparedRay::unscaled`].
 #[inline(always)]
 pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
-    let t = lesser(t * unscale, f32::MAX);
+    let t = greater(lesser(t * unscale, f32::MAX), f32::MIN);
     // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
     lesser(greater(t, ray.t_min), ray.t_max) + 0.0
 }
