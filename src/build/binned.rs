@@ -37,7 +37,7 @@ pub(super) fn build<I: Input>(
     }
     let nodes = subtree(input, &mut refs, 0, 1, leaves, watch);
     watch.check()?;
-    let nodes = prune(nodes, leaves);
+    let nodes = prune(nodes, leaves, watch);
     let order = refs.iter().map(Ref::id).collect();
     Ok(BinaryTree::new_unchecked(nodes, order))
 }

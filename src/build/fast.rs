@@ -35,9 +35,11 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
         nodes,
     } = grow(input, refs, watch)?;
     let collapse = Collapse::<W>::of_leaves(input, &nodes, watch);
-    watch.phase(0.95, nodes.len())?;
+    watch.phase(0.93, nodes.len())?;
     let (wide, led_to) = walk(&nodes, &collapse, watch)?;
+    watch.phase(1.0, led_to.len())?;
     let leaf = |&node: &usize| {
+        watch.advance(1);
         let number = nodes[node].first as usize;
         leaves.get(number / PART)?.get(number % PART).copied()
     };

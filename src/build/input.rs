@@ -1,7 +1,10 @@
 //! What trees are built over: the triangles of a mesh, or a caller's boxes. All that differs between
 //! the two is here.
 
-use super::{BuildError, cost, fill::Filling};
+use super::{
+    BuildError, cost,
+    fill::{Corners, Filling},
+};
 use crate::{
     geometry::{Aabb, TriangleMesh, is_degenerate},
     layout::{Leaf, PrimitiveLeaf, TriangleLeaf},
@@ -26,6 +29,10 @@ pub(super) trait Input: Sync {
     type Leaf: Leaf + Send;
     /// A leaf while it is filled.
     type Filling: Copy + Send;
+    /// What a leaf has of a primitive.
+    type Loaded: Copy;
+    /// That of no primitive.
+    const UNLOADED: Self::Loaded;
     /// One without primitives.
     const EMPTY: Self::Filling;
     /// The most primitives a leaf has.
@@ -47,8 +54,15 @@ pub(super) trait Input: Sync {
     fn primitive(&self, number: u32) -> u32;
     /// Empties a leaf.
     fn clear(filling: &mut Self::Filling);
+    /// What a leaf has of a primitive.
+    fn load(&self, id: u32) -> Self::Loaded;
     /// Adds a primitive to a leaf, if it fits.
-    fn add(&self, filling: &mut Self::Filling, id: u32) -> bool;
+    fn add_loaded(filling: &mut Self::Filling, loaded: &Self::Loaded) -> bool;
+    /// Adds a primitive to a leaf, if it fits.
+    #[inline(always)]
+    fn add(&self, filling: &mut Self::Filling, id: u32) -> bool {
+        Self::add_loaded(filling, &self.load(id))
+    }
     /// Whether these primitives can be one leaf.
     #[inline]
     fn fits(&self, ids: &[u32]) -> bool {
@@ -90,6 +104,8 @@ fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
 impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
     type Filling = Filling;
+    type Loaded = Corners;
+    const UNLOADED: Corners = Corners::NONE;
     const EMPTY: Filling = Filling::EMPTY;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
     const JOINED: f32 = cost::TRIANGLES_JOINED;
@@ -139,8 +155,13 @@ impl Input for Triangles<'_> {
     }
 
     #[inline(always)]
-    fn add(&self, filling: &mut Filling, id: u32) -> bool {
-        filling.add(self.0, id)
+    fn load(&self, id: u32) -> Corners {
+        Corners::new(self.0, id)
+    }
+
+    #[inline(always)]
+    fn add_loaded(filling: &mut Filling, corners: &Corners) -> bool {
+        filling.add(corners)
     }
 
     #[inline]
@@ -167,6 +188,8 @@ impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
     /// How many there are, and the box around them.
     type Filling = (usize, Aabb);
+    type Loaded = Aabb;
+    const UNLOADED: Aabb = Aabb::EMPTY;
     const EMPTY: Self::Filling = (0, Aabb::EMPTY);
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
     const JOINED: f32 = 1.0;
@@ -209,11 +232,16 @@ impl Input for Boxes<'_> {
     }
 
     #[inline]
-    fn add(&self, (count, aabb): &mut Self::Filling, id: u32) -> bool {
+    fn load(&self, id: u32) -> Aabb {
+        self.aabb(id)
+    }
+
+    #[inline]
+    fn add_loaded((count, aabb): &mut Self::Filling, own: &Aabb) -> bool {
         let fits = *count < Self::MAX_LEAF;
         if fits {
             *count += 1;
-            *aabb = aabb.join(self.aabb(id));
+            *aabb = aabb.join(*own);
         }
         fits
     }

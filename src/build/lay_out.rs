@@ -6,6 +6,7 @@
 
 use super::{
     binary::{BinaryNode, BinaryTree},
+    monitor::Watch,
     sweep::Leaves,
 };
 use crate::geometry::Aabb;
@@ -14,7 +15,7 @@ use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
 
 /// The nodes that the root leads to, if there may be others.
-pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves) -> Vec<BinaryNode> {
+pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves, watch: &Watch) -> Vec<BinaryNode> {
     if leaves.below == 0.0 {
         return nodes;
     }
@@ -26,6 +27,7 @@ pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves) -> Vec<BinaryNode> {
         }
     }
     lay_out(counts[0] as usize, 0, |index: usize, _| {
+        watch.advance(1);
         let node = nodes[index];
         if node.is_leaf() {
             return Part::Leaf(node);

@@ -45,6 +45,8 @@ impl<'a, I: Input> Pieces<'a, I> {
 impl<I: Input> Input for Pieces<'_, I> {
     type Leaf = I::Leaf;
     type Filling = I::Filling;
+    type Loaded = I::Loaded;
+    const UNLOADED: I::Loaded = I::UNLOADED;
     const EMPTY: I::Filling = I::EMPTY;
     const MAX_LEAF: usize = I::MAX_LEAF;
     const JOINED: f32 = I::JOINED;
@@ -81,8 +83,13 @@ impl<I: Input> Input for Pieces<'_, I> {
     }
 
     #[inline(always)]
-    fn add(&self, filling: &mut I::Filling, number: u32) -> bool {
-        self.input.add(filling, self.primitive(number))
+    fn load(&self, number: u32) -> I::Loaded {
+        self.input.load(self.primitive(number))
+    }
+
+    #[inline(always)]
+    fn add_loaded(filling: &mut I::Filling, loaded: &I::Loaded) -> bool {
+        I::add_loaded(filling, loaded)
     }
 
     fn leaf_cost(count: usize) -> f32 {

@@ -2,7 +2,7 @@
 
 use super::{
     error::{BuildError, RefitError},
-    fill::Filling,
+    fill::{Corners, Filling},
     input::{Boxes, Input, Triangles, Verdict},
 };
 use crate::{
@@ -214,9 +214,10 @@ fn move_leaf(
         None => {
             let mut filling = Filling::EMPTY;
             for (triangle, &id) in ids.iter().enumerate() {
+                let corners = Corners::new(mesh, id);
                 if have_area & 1 << triangle == 0 {
-                    filling.add_none(mesh, id);
-                } else if !filling.add(mesh, id) {
+                    filling.add_none(&corners);
+                } else if !filling.add(&corners) {
                     let primitive = id as usize;
                     return Err(RefitError::VerticesParted { primitive });
                 }

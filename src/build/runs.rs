@@ -16,6 +16,9 @@ pub(super) struct Runs<L> {
     base: u32,
 }
 
+/// So many are loaded at once: the cache misses of one wait for those of none before it.
+const AHEAD: usize = 64;
+
 /// Cuts a part of the curve, the places of whose references among `refs` are given, into leaves: each goes on for as
 /// long as there is room and the heuristic has it better than two. `first` is where the part begins.
 pub(super) fn cut<I: Input>(
@@ -30,34 +33,39 @@ pub(super) fn cut<I: Input>(
         leaves: Vec::with_capacity(places.len() / 2),
         nodes: Vec::with_capacity(places.len() / 2),
     };
+    if !watch.advance(places.len()) {
+        return runs;
+    }
     let mut filling = I::EMPTY;
     let mut bounds = Bounds::EMPTY;
     let mut cost = 0.0;
     let mut start = 0;
-    if !watch.advance(places.len()) {
-        return runs;
-    }
-    for (index, &place) in places.iter().enumerate() {
-        let r = &refs[place as usize];
-        let own = r.bounds();
-        let own_cost = own.half_area() * I::leaf_cost(1);
-        if index > start {
+    let mut index = 0;
+    let mut loaded = [(Ref::NONE, I::UNLOADED); AHEAD];
+    for places in places.chunks(AHEAD) {
+        for (loaded, &place) in loaded.iter_mut().zip(places) {
+            let r = refs[place as usize];
+            *loaded = (r, input.load(r.id()));
+        }
+        for (r, loaded) in &loaded[..places.len()] {
+            let own = r.bounds();
+            let own_cost = own.half_area() * I::leaf_cost(1);
             let joined = bounds.join(own);
             let joined_cost = joined.half_area() * I::leaf_cost(index - start + 1);
             let better = joined_cost <= (cost + own_cost) * I::JOINED;
-            if better && input.add(&mut filling, r.id()) {
+            if index > start && better && I::add_loaded(&mut filling, loaded) {
                 (bounds, cost) = (joined, joined_cost);
-                continue;
+            } else {
+                runs.close::<I>(&filling, index - start, first + start);
+                I::clear(&mut filling);
+                // One alone always fits.
+                I::add_loaded(&mut filling, loaded);
+                (bounds, cost, start) = (own, own_cost, index);
             }
-            runs.close::<I>(&filling, index - start, first + start);
-            start = index;
+            index += 1;
         }
-        I::clear(&mut filling);
-        // One alone always fits.
-        input.add(&mut filling, r.id());
-        (bounds, cost) = (own, own_cost);
     }
-    runs.close::<I>(&filling, places.len() - start, first + start);
+    runs.close::<I>(&filling, index - start, first + start);
     runs
 }
 

@@ -455,7 +455,12 @@ fn finish<I: Input>(
             right,
             left_leaves: parts[left].count,
         },
-        Grown::Rest(_) => Part::Tree(built.next().unwrap_or_default()),
+        Grown::Rest(_) => {
+            watch.advance(STRIDE);
+            Part::Tree(built.next().unwrap_or_default())
+        }
     });
-    Ok(BinaryTree::new_unchecked(prune(nodes, leaves), order))
+    watch.advance(0);
+    let nodes = prune(nodes, leaves, watch);
+    Ok(BinaryTree::new_unchecked(nodes, order))
 }
