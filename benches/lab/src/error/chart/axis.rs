@@ -75,7 +75,7 @@ impl ErrorScale {
         keys.extend(zero);
         let span = (most - least).max(1.0);
         // Below zero there is room for the labels of those that are on its line.
-        let low = zero.map_or(least.min(most - 1.0), |zero| zero - 0.45 * span);
+        let low = zero.map_or(least.min(most - 1.0), |zero| zero - 0.2 * span - 0.4);
         Self {
             range: low..most + 0.12 * span,
             keys,

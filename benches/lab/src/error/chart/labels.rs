@@ -153,7 +153,7 @@ fn cost(
             _ => {}
         }
     }
-    cost += 40.0 * lines.iter().filter(|&&line| rect.meets(line)).count() as f64;
+    cost += 120.0 * lines.iter().filter(|&&line| rect.meets(line)).count() as f64;
     Some(cost)
 }
 
