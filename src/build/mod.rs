@@ -16,8 +16,8 @@
 //!
 //! `refit` makes boxes anew when primitives have moved.
 //!
-//! But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses deeper than a
-//! bound, whatever the tree.
+//! But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses
+//! deeper than a bound, whatever the tree. `monitor` is told of all that takes long.
 
 mod adopt;
 mod binary;

@@ -256,3 +256,84 @@ impl Base {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::BinaryTree;
+    use glam::Vec3;
+
+    fn leaf(number: u32, aabb: Aabb) -> BinaryNode {
+        BinaryNode {
+            aabb,
+            first: number,
+            count: 1,
+        }
+    }
+
+    /// Has a tree of all in parts of so many.
+    fn check(boxes: &[Aabb], part: usize) -> Vec<BinaryNode> {
+        let watch = Watch::none();
+        let leaves: Vec<_> = boxes.iter().zip(0..).map(|(&b, i)| leaf(i, b)).collect();
+        let parts: Vec<_> = leaves
+            .chunks(part)
+            .map(|leaves| Part::new(leaves.to_vec(), 1.0, &watch))
+            .collect();
+        let nodes = tree(&parts, 1.0, &watch);
+        assert_eq!(nodes.len(), 2 * boxes.len() - 1);
+        for (index, node) in nodes.iter().enumerate() {
+            let aabb = if node.is_leaf() {
+                boxes[node.first as usize]
+            } else {
+                let [left, right] = node.children();
+                assert!(left > index);
+                nodes[left].aabb.join(nodes[right].aabb)
+            };
+            assert_eq!(node.aabb, aabb);
+        }
+        // Every leaf is there, once.
+        let order = (0..boxes.len() as u32).collect();
+        assert!(BinaryTree::new(nodes.clone(), order).is_ok());
+        nodes
+    }
+
+    #[test]
+    fn trees() {
+        let at = |x: f32| Aabb::new(Vec3::splat(x), Vec3::splat(x + 0.001));
+        for count in [1, 2, 3, 7, 100, 1000] {
+            let row: Vec<_> = (0..count).map(|i| at(i as f32 / 1000.0)).collect();
+            for part in [1, 3, 64, 1000] {
+                check(&row, part);
+            }
+            check(&vec![at(0.0); count], 64);
+        }
+        // Pairs that are close are joined first.
+        let pairs = [0.0, 0.002, 1.0, 1.002, 2.0, 2.002].map(at);
+        let nodes = check(&pairs, 6);
+        let lowest = |node: &&BinaryNode| {
+            !node.is_leaf() && node.children().iter().all(|&child| nodes[child].is_leaf())
+        };
+        assert_eq!(nodes.iter().filter(lowest).count(), 3);
+    }
+
+    /// Each is best joined with the one before: as many rounds as there are, but for the halving.
+    #[test]
+    fn rounds_are_few() {
+        let boxes: Vec<_> = (0..20_000)
+            .map(|i| {
+                let x = 1.0 - 0.9998f32.powi(i);
+                Aabb::new(Vec3::splat(x), Vec3::splat(x))
+            })
+            .collect();
+        let nodes = check(&boxes, boxes.len());
+        let mut depths = vec![0; nodes.len()];
+        for (index, node) in nodes.iter().enumerate() {
+            if !node.is_leaf() {
+                for child in node.children() {
+                    depths[child] = depths[index] + 1;
+                }
+            }
+        }
+        assert!(depths.into_iter().max() < Some(300));
+    }
+}

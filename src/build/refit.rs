@@ -18,9 +18,9 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
     /// triangles must be those that this one was built on, by number.
     ///
     /// The time is linear, and less than that of any build. But the tree stays what it was, so queries get slower the
-    /// further what was close together moves apart, or what was apart through each other: build again when
-    /// [`BuildReport::sah_cost`](super::BuildReport::sah_cost) has grown by a fifth or so, which is about what a query then
-    /// takes more. Pieces of triangles that the builder cut get the box of the whole triangle, so for what moves
+    /// further what was close together moves apart, or what was apart through each other: by about as much as
+    /// [`BuildReport::sah_cost`](super::BuildReport::sah_cost) grows. When that is more than a build is worth, build
+    /// again. Pieces of triangles that the builder cut get the box of the whole triangle, so for what moves
     /// [`Preset::Balanced`](super::Preset::Balanced) or [`splits(0.0)`](super::Builder::splits) is the better start.
     ///
     /// Triangles that lose their area are not hit, and are again when they regain it. Vertices at one place may part,
@@ -46,7 +46,7 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
 
 impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
     /// Follows primitives that have moved: `aabbs` are their boxes now, in the same order as when the hierarchy was
-    /// built. What that does to the tree is said where triangles are [refitted](crate::layout::Bvh8).
+    /// built. The tree stays what it was, so queries get slower as for triangles.
     ///
     /// A box that is [`Aabb::EMPTY`] stands for a primitive that is never hit.
     ///

@@ -182,9 +182,9 @@ impl<I: Input> Sweep<'_, I> {
         let mut best = [((f32::INFINITY, usize::MAX), len / 2); 3];
         let mut least = f32x4::splat(f32::INFINITY);
         let mut bounds = [Bounds::EMPTY; 3];
-        for place in 1..len {
+        for (place, &right_costs) in right_costs[..len].iter().enumerate().skip(1) {
             bounds = join(bounds, place - 1);
-            let costs = half_areas(bounds) * f32x4::splat(place as f32) + right_costs[place];
+            let costs = half_areas(bounds) * f32x4::splat(place as f32) + right_costs;
             if costs.simd_le(least).to_bitmask() & 7 == 0 {
                 continue;
             }
