@@ -183,6 +183,7 @@ fn turns(count: usize, rng: &mut Rng) -> Vec<usize> {
 }
 
 /// How an engine did on a workload.
+#[derive(Clone)]
 struct Score {
     mrays_per_s: f64,
     disagreements: usize,

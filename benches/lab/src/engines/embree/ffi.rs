@@ -316,6 +316,7 @@ functions! {
     new_scene = "rtcNewScene": fn(Handle) -> Handle;
     release_scene = "rtcReleaseScene": fn(Handle);
     set_scene_build_quality = "rtcSetSceneBuildQuality": fn(Handle, c_int);
+    set_geometry_build_quality = "rtcSetGeometryBuildQuality": fn(Handle, c_int);
     set_scene_flags = "rtcSetSceneFlags": fn(Handle, c_int);
     attach_geometry = "rtcAttachGeometry": fn(Handle, Handle) -> c_uint;
     commit_scene = "rtcCommitScene": fn(Handle);

@@ -131,6 +131,8 @@ impl Scene {
                 scene.buffers.indices.as_ptr().cast(),
                 scene.buffers.indices.len(),
             );
+            // A scene of LOW quality asks each geometry for its own.
+            (api.set_geometry_build_quality)(geometry, recipe.quality);
             (api.commit_geometry)(geometry);
             (api.attach_geometry)(scene.handle, geometry);
             (api.release_geometry)(geometry);
