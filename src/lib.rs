@@ -19,8 +19,8 @@
 //! # What is promised
 //!
 //! 1. The answer of [`mod@reference`], bit for bit: of all primitives hit within the ray's range the one
-//!    of least `t`, of equal ones the one of least number. The tree, its width, the processor and the
-//!    number of threads that built it change nothing.
+//!    of least `t`, of equal ones the one of least number. The tree, its width, the processor, the number of
+//!    threads that built it, and what other rays are asked about in the same call change nothing.
 //! 2. No ray slips through a closed mesh whose triangles share their vertices' positions.
 //! 3. Numbers that are no numbers are answers, not accidents: a ray that makes no sense hits nothing, and no
 //!    input to a safe function panics, hangs or reads out of bounds.
@@ -35,7 +35,7 @@
 //!
 //! - `std` (default): the builder.
 //! - `alloc`: hierarchies that own their memory. Without it they are borrowed slices.
-//! - `rayon`: builds on all cores. The tree is the same, bit for bit.
+//! - `rayon`: builds on all cores, and batches if asked to. Tree and answers are the same, bit for bit.
 
 #[cfg(feature = "alloc")]
 extern crate alloc;

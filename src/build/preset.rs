@@ -5,13 +5,13 @@
 /// The answers are the same. On one thread of an AMD EPYC (Zen 5) server, over a scan of 70,000 triangles, one of 870,000,
 /// a kitchen and three game levels:
 ///
-/// | | build, ns a triangle | closest and any hits, of [`Best`](Self::Best)'s |
+/// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 120 to 180, the large scan 260 | 0.77 |
-/// | [`Balanced`](Self::Balanced) | 390 to 510 | 0.94 |
-/// | [`Best`](Self::Best) | 1,070 to 1,490 | 1 |
+/// | [`Fast`](Self::Fast) | 130 to 170, the large scan 300 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 360 to 500 | 0.94 |
+/// | [`Best`](Self::Best) | 1,010 to 1,460 | 1 |
 ///
-/// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 80.
+/// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
