@@ -430,9 +430,6 @@ impl<T: Simd> Packet<T> {
                 new |= u32::from(hit) << lane;
                 continue;
             }
-            let Some(hits) = leaf.test::<T, true>(token, &shear, t_max) else {
-                continue;
-            };
             let mut best = None;
             if found >> lane & 1 != 0 {
                 best = Some(Found {
@@ -441,7 +438,7 @@ impl<T: Simd> Packet<T> {
                     ..Found::default()
                 });
             }
-            let closer = Found::choose::<T>(&mut best, &mut t_max, leaf, hits, primitives);
+            let closer = Found::update(token, &mut best, &mut t_max, leaf, &shear, primitives);
             if let (true, Some(best)) = (closer, best) {
                 let place = f32::from_bits(best.place as u32);
                 self.t_max = self.t_max.replace(token, lane, best.t);

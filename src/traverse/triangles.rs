@@ -51,7 +51,8 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Takes note of the triangles of `leaf` that are hit up to `t_max`, which becomes the best one's.
+    /// Takes note of the triangles of `leaf` that are hit up to `t_max`, which becomes the best one's. Whether there is a
+    /// new best one.
     #[inline(always)]
     pub(super) fn update<T: Simd>(
         token: T,
@@ -60,11 +61,11 @@ impl Found {
         leaf: &TriangleLeaf,
         shear: &RayShear<'_, T::F32x8>,
         primitives: &[u32],
-    ) {
+    ) -> bool {
         let Some(hits) = leaf.test::<T, true>(token, shear, *t_max) else {
-            return;
+            return false;
         };
-        Self::choose::<T>(best, t_max, leaf, hits, primitives);
+        Self::choose::<T>(best, t_max, leaf, hits, primitives)
     }
 
     /// Takes note of hits in `leaf`, none farther than `t_max`, which becomes the best one's. Whether there is a new
