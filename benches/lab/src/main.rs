@@ -5,6 +5,7 @@ mod engines;
 mod error;
 mod exact;
 mod limit;
+mod output;
 mod race;
 mod reference;
 mod scenes;

@@ -15,7 +15,7 @@ mod truth;
 
 use crate::{
     engines::{self, Engine},
-    scenes, workloads,
+    output, scenes, workloads,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use measure::Outcome;
@@ -24,7 +24,6 @@ use record::{Figures, Pool, Record};
 use std::{
     collections::BTreeMap,
     error::Error,
-    fs::File,
     io::{self, Write},
     path::PathBuf,
 };
@@ -84,11 +83,8 @@ impl Effort {
 /// A scene that cannot be read, an engine that cannot be built, a file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let scenes = args.scenes.load()?;
-    // Now, so that no minutes are spent on figures that cannot be written.
-    let create =
-        |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
-    let json = args.json.as_ref().map(create).transpose()?;
-    let svg = args.svg.as_ref().map(create).transpose()?;
+    let json = output::create(args.json.as_deref())?;
+    let svg = output::create(args.svg.as_deref())?;
     let effort = if args.quick {
         Effort::QUICK
     } else {

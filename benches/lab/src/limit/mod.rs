@@ -5,13 +5,13 @@ mod table;
 
 use crate::{
     effort::{self, Effort},
-    scenes,
+    output, scenes,
     stats::median,
     workloads::{Query, Workload, workloads},
 };
 use floor::Sweeps;
 use serde::Serialize;
-use std::{error::Error, fs::File, hint::black_box, path::PathBuf, time::Instant};
+use std::{error::Error, hint::black_box, path::PathBuf, time::Instant};
 use wide_bvh::{build::Builder, geometry::TriangleMesh, layout::Bvh8, traverse::Counts};
 
 /// Compare the time of a ray to the time of its tests alone.
@@ -70,9 +70,7 @@ impl Record {
 /// A scene that cannot be read or built on, a JSON file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let scenes = args.scenes.load()?;
-    let create =
-        |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
-    let json = args.json.as_ref().map(create).transpose()?;
+    let json = output::create(args.json.as_deref())?;
     let effort = args.effort.effort();
     let mut records = Vec::new();
     for scene in &scenes {

@@ -14,6 +14,7 @@ mod table;
 use crate::{
     effort::{self, Effort},
     engines::{self, Batch, Engine},
+    output,
     reference::Sample,
     scenes,
     stats::median,
@@ -23,7 +24,6 @@ use fastrand::Rng;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     error::Error,
-    fs::File,
     hint::black_box,
     io::{self, Write},
     path::PathBuf,
@@ -103,10 +103,7 @@ impl Args {
 /// A scene that cannot be read, an engine that cannot be built, a JSON file that cannot be written.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let scenes = args.scenes.load()?;
-    // Now, so that no minutes are spent on figures that cannot be written.
-    let create =
-        |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
-    let json = args.json.as_ref().map(create).transpose()?;
+    let json = output::create(args.json.as_deref())?;
     let effort = args.effort.effort();
     let chosen = |name: &str| args.chosen(name);
 

@@ -10,6 +10,7 @@ mod tally;
 mod trees;
 mod variants;
 
+use crate::output;
 use case::Case;
 use check::Violation;
 use families::{FAMILIES, Family};
@@ -18,7 +19,6 @@ use rayon::prelude::*;
 use std::{
     error::Error,
     fmt::Write as _,
-    fs::File,
     panic::catch_unwind,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
@@ -85,9 +85,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         }
         return Ok(());
     }
-    let create =
-        |path: &PathBuf| File::create(path).map_err(|error| format!("{}: {error}", path.display()));
-    let json = args.json.as_ref().map(create).transpose()?;
+    let json = output::create(args.json.as_deref())?;
 
     let start = Instant::now();
     let rows = stress(&chosen, args.seed, args.rays, args.case)?;
