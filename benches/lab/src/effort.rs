@@ -35,6 +35,7 @@ impl Effort {
 
 /// The options for it.
 #[derive(clap::Args)]
+#[group(skip)]
 pub struct Args {
     /// Few rays and rounds: minutes become seconds, and the figures rough. So few rays meet so little of a
     /// tree that it stays in the caches, which flatters the engines that need most of it

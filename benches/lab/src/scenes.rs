@@ -8,6 +8,7 @@ const CROWD: usize = 10_000_000;
 
 /// Whence they come.
 #[derive(clap::Args)]
+#[group(skip)]
 pub struct Args {
     /// Meshes to measure over (PLY, OBJ, binary glTF); without any, a scene made by code
     #[arg(long, value_name = "FILE", num_args = 1..)]
