@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Variants, config, point, point_on, soup, target};
+use common::{Variants, config, part, point, point_on, soup, target};
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::geometry::Ray;
@@ -39,7 +39,7 @@ fn shapes_of_all_kinds() {
     ];
     for mesh in shapes {
         let variants = Variants::new(mesh.positions.clone(), mesh.indices.clone());
-        let count = 2_000_000 / (mesh.indices.len() + 5000);
+        let count = part(2_000_000 / (mesh.indices.len() + 5000));
         let mut hits = 0;
         for ray in rays(&mesh, count) {
             hits += usize::from(variants.check(&ray).unwrap().is_some());

@@ -120,30 +120,22 @@ fn batches() {
     });
 }
 
-/// Packets of as many rays, and one beside each that is its own kind: alike, they go through the tree side by side.
+/// Packets of as many rays, and packets of one ray again and again: alike, they go through the tree side by side.
 fn packet<N: WideNode, const RAYS: usize>(vectors: &Vectors) {
     on_variants::<N>(vectors, |bvh, check| {
-        for first in 0..vectors.rays.len() - RAYS {
-            let mixed: &[Ray; RAYS] = vectors.rays[first..].first_chunk().unwrap();
-            let same = [vectors.rays[first]; RAYS];
-            if first % RAYS == 0 {
-                let (hits, any) = (
-                    bvh.closest_hit_packet(mixed, u64::MAX),
-                    bvh.any_hit_packet(mixed, u64::MAX),
-                );
-                for lane in 0..RAYS {
-                    check(first + lane, hits[lane]);
-                    assert_eq!(any[lane], hits[lane].is_some(), "{:?}", mixed[lane]);
-                }
-            }
-            let (hits, any) = (
-                bvh.closest_hit_packet(&same, u64::MAX),
-                bvh.any_hit_packet(&same, u64::MAX),
-            );
+        let packet = |rays: &[Ray; RAYS], number: &dyn Fn(usize) -> usize| {
+            let hits = bvh.closest_hit_packet(rays, u64::MAX);
+            let any = bvh.any_hit_packet(rays, u64::MAX);
             for lane in 0..RAYS {
-                check(first, hits[lane]);
-                assert_eq!(any[lane], hits[lane].is_some(), "{:?}", same[lane]);
+                check(number(lane), hits[lane]);
+                assert_eq!(any[lane], hits[lane].is_some(), "{:?}", rays[lane]);
             }
+        };
+        for (chunk, rays) in vectors.rays.as_chunks().0.iter().enumerate() {
+            packet(rays, &|lane| RAYS * chunk + lane);
+        }
+        for (number, &ray) in vectors.rays.iter().enumerate().step_by(3) {
+            packet(&[ray; RAYS], &|_| number);
         }
     });
 }
