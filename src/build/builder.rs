@@ -2,14 +2,15 @@
 
 use super::{
     BinaryTree, BuildError, Monitor, Preset,
-    input::{Boxes, Input, Triangles},
+    compact::compact,
+    input::{Boxes, Input, Triangles, TrianglesInRuns},
     monitor::{Monitored, Watch},
     pipeline,
     refs::Refs,
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
-    layout::{Bvh, Bvh8, Owned, PrimitiveLeaf, TriangleLeaf, WideNode},
+    layout::{Bvh, Bvh8, Node4, Node8, Owned, PrimitiveLeaf, RunLeaf, TriangleLeaf, WideNode},
 };
 
 /// Builds hierarchies: a binary tree by the surface area heuristic, its subtrees moved to where they cost
@@ -137,6 +138,41 @@ impl<'m> Builder<'m> {
         self.wide_over(&Triangles(mesh))
     }
 
+    /// The compact hierarchy over a mesh, which stays where it is and is read there: see
+    /// [`over`](Bvh::over). `N` is [`CompactNode8`](crate::layout::CompactNode8) or
+    /// [`CompactNode4`](crate::layout::CompactNode4).
+    ///
+    /// ```
+    /// use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}, layout::CompactBvh8};
+    ///
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0f32]];
+    /// let mesh = TriangleMesh::new(&positions, &[[0, 1, 2]])?;
+    /// let compact: CompactBvh8 = Builder::new().build_compact(&mesh)?;
+    /// let bvh = compact.over(&mesh)?;
+    /// assert!(bvh.closest_hit(&Ray::new([0.2, 0.2, -1.0], [0.0, 0.0, 1.0])).is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`build`](Self::build); more than 2^28 - 2 triangles or pieces of them.
+    pub fn build_compact<N: WideNode>(
+        &self,
+        mesh: &TriangleMesh,
+    ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
+        self.compact_over(&TrianglesInRuns(mesh))
+    }
+
+    /// The compact hierarchy over a caller's primitives. See [`build_primitives`](Self::build_primitives).
+    ///
+    /// # Errors
+    /// As [`build_primitives`](Self::build_primitives); more than 2^28 - 2 primitives.
+    pub fn build_compact_primitives<N: WideNode>(
+        &self,
+        aabbs: &[Aabb],
+    ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
+        self.compact_over(&Boxes(aabbs))
+    }
+
     /// The hierarchy over a caller's primitives, which are numbered as their boxes are.
     ///
     /// A box that is [`Aabb::EMPTY`] stands for a primitive that is never hit.
@@ -216,6 +252,17 @@ impl<'m> Builder<'m> {
         let watch = Watch::new(self.monitored);
         let refs = Refs::gather(input, self.drop_non_finite, &watch)?;
         pipeline::from_refs(input, refs, self.preset, self.splits, &watch)
+    }
+
+    fn compact_over<N: WideNode, I: Input<Leaf = PrimitiveLeaf>>(
+        &self,
+        input: &I,
+    ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
+        let compact = match N::WIDTH {
+            4 => compact(&self.wide_over::<Node4, I>(input)?),
+            _ => compact(&self.wide_over::<Node8, I>(input)?),
+        };
+        Ok(compact?)
     }
 
     fn wide_from<N: WideNode, I: Input>(

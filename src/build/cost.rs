@@ -16,6 +16,12 @@ pub(super) const TRIANGLE: f32 = 0.05;
 /// game level: from 1 to 1.5 the speed is the same, but a triangle of the scan takes 47, 44 (at 1.1), 41 (1.3) or
 /// 40 bytes (1.5).
 pub(super) const TRIANGLES_JOINED: f32 = 1.3;
+/// The cost of a leaf of triangles that are read where a mesh has them.
+pub(super) const RUN_LEAF: f32 = 1.0;
+/// What each of its triangles adds: its corners are fetched one by one.
+pub(super) const RUN_TRIANGLE: f32 = 0.15;
+/// As [`TRIANGLES_JOINED`].
+pub(super) const RUNS_JOINED: f32 = 1.1;
 /// The cost of getting to a leaf of a caller's primitives. Assumed.
 pub(super) const PRIMITIVE_LEAF: f32 = 0.3;
 /// The cost of a caller's primitive: a call and a test, one at a time. Assumed: what it does is not known.

@@ -259,3 +259,70 @@ impl Input for Boxes<'_> {
         (count > 0).then(|| PrimitiveLeaf::new(first, count as u32))
     }
 }
+
+/// The triangles of a mesh, for leaves that read them there: any few make a leaf.
+#[derive(Clone, Copy)]
+pub(super) struct TrianglesInRuns<'a>(pub &'a TriangleMesh<'a>);
+
+impl Input for TrianglesInRuns<'_> {
+    type Leaf = PrimitiveLeaf;
+    type Filling = (usize, Aabb);
+    type Loaded = Aabb;
+    const UNLOADED: Aabb = Aabb::EMPTY;
+    const EMPTY: Self::Filling = Boxes::EMPTY;
+    const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
+    const JOINED: f32 = cost::RUNS_JOINED;
+    const CAN_SPLIT: bool = true;
+
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline]
+    fn verdict(&self, id: u32) -> Verdict {
+        Triangles(self.0).verdict(id)
+    }
+
+    #[inline]
+    fn aabb(&self, id: u32) -> Aabb {
+        Triangles(self.0).aabb(id)
+    }
+
+    #[inline]
+    fn triangle(&self, id: u32) -> Option<[Vec3; 3]> {
+        Triangles(self.0).triangle(id)
+    }
+
+    #[inline]
+    fn primitive(&self, number: u32) -> u32 {
+        number
+    }
+
+    #[inline]
+    fn clear(filling: &mut Self::Filling) {
+        Boxes::clear(filling);
+    }
+
+    #[inline]
+    fn load(&self, id: u32) -> Aabb {
+        self.aabb(id)
+    }
+
+    #[inline]
+    fn add_loaded(filling: &mut Self::Filling, own: &Aabb) -> bool {
+        Boxes::add_loaded(filling, own)
+    }
+
+    fn aabb_of(filling: &Self::Filling) -> Aabb {
+        Boxes::aabb_of(filling)
+    }
+
+    #[inline]
+    fn leaf_cost(count: usize) -> f32 {
+        cost::RUN_LEAF + cost::RUN_TRIANGLE * count as f32
+    }
+
+    fn leaf(filling: &Self::Filling, first: u32) -> Option<PrimitiveLeaf> {
+        Boxes::leaf(filling, first)
+    }
+}

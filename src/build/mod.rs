@@ -25,6 +25,7 @@ mod binned;
 mod builder;
 mod clip;
 mod collapse;
+mod compact;
 mod cost;
 mod emit;
 mod error;

@@ -1,8 +1,8 @@
 //! The hierarchy: its parts, checked once when they are put together.
 
 use super::{
-    Borrowed, Child, LayoutError, Leaf, Node4, Node8, PrimitiveLeaf, Storage, TriangleLeaf,
-    WideNode, check,
+    Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, MeshLeaf, Node4, Node8,
+    PrimitiveLeaf, RunLeaf, Runs, Storage, TriangleLeaf, WideNode, check,
 };
 use crate::{geometry::Aabb, simd::Backend};
 use core::fmt;
@@ -11,10 +11,12 @@ use core::fmt;
 ///
 /// Built by [`Builder`](crate::build::Builder), or put together from parts by [`from_parts`](Self::from_parts).
 #[derive(Clone)]
-pub struct Bvh<N: WideNode, L: Leaf, S: Storage> {
+pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     nodes: S::Slice<N>,
-    leaves: S::Slice<L>,
+    leaves: L::Store<S>,
     primitives: S::Slice<u32>,
+    /// One more than the greatest primitive number, if that has been asked for.
+    pub(super) numbers: u64,
     root: Child,
     bounds: Aabb,
     backend: Backend,
@@ -29,6 +31,14 @@ pub type Bvh4Ref<'a> = Bvh<Node4, TriangleLeaf, Borrowed<'a>>;
 pub type PrimitiveBvh8Ref<'a> = Bvh<Node8, PrimitiveLeaf, Borrowed<'a>>;
 /// A caller's primitives under 4-wide nodes, borrowed.
 pub type PrimitiveBvh4Ref<'a> = Bvh<Node4, PrimitiveLeaf, Borrowed<'a>>;
+/// Primitive numbers under 8-wide nodes of 80 bytes, borrowed.
+pub type CompactBvh8Ref<'a> = Bvh<CompactNode8, RunLeaf, Borrowed<'a>>;
+/// Primitive numbers under 4-wide nodes of 48 bytes, borrowed.
+pub type CompactBvh4Ref<'a> = Bvh<CompactNode4, RunLeaf, Borrowed<'a>>;
+/// A mesh's triangles under 8-wide nodes of 80 bytes, borrowed, mesh and all.
+pub type MeshBvh8<'a> = Bvh<CompactNode8, MeshLeaf<'a>, Borrowed<'a>>;
+/// A mesh's triangles under 4-wide nodes of 48 bytes, borrowed, mesh and all.
+pub type MeshBvh4<'a> = Bvh<CompactNode4, MeshLeaf<'a>, Borrowed<'a>>;
 
 #[cfg(feature = "alloc")]
 mod owned {
@@ -43,11 +53,15 @@ mod owned {
     pub type PrimitiveBvh8 = Bvh<Node8, PrimitiveLeaf, Owned>;
     /// A caller's primitives under 4-wide nodes.
     pub type PrimitiveBvh4 = Bvh<Node4, PrimitiveLeaf, Owned>;
+    /// Primitive numbers under 8-wide nodes of 80 bytes.
+    pub type CompactBvh8 = Bvh<CompactNode8, RunLeaf, Owned>;
+    /// Primitive numbers under 4-wide nodes of 48 bytes.
+    pub type CompactBvh4 = Bvh<CompactNode4, RunLeaf, Owned>;
 }
 #[cfg(feature = "alloc")]
 pub use owned::*;
 
-impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
+impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// Puts a hierarchy together.
     ///
     /// The parts are in one canonical order, which makes the check linear and needs no memory: `root` is
@@ -61,12 +75,13 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
     /// is no box, or is not within `bounds`.
     pub fn from_parts(
         nodes: S::Slice<N>,
-        leaves: S::Slice<L>,
+        leaves: L::Store<S>,
         primitives: S::Slice<u32>,
         bounds: Aabb,
     ) -> Result<Self, LayoutError> {
-        let root = check::check(&nodes, &leaves, &primitives, &bounds)?;
+        let root = check::check::<N, L, S>(&nodes, &leaves, &primitives, &bounds)?;
         Ok(Self {
+            numbers: L::numbers(&primitives),
             nodes,
             leaves,
             primitives,
@@ -83,10 +98,20 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
         &self.nodes
     }
 
-    /// The leaves.
+    /// What is read first of the leaf at a place.
     #[inline(always)]
-    pub fn leaves(&self) -> &[L] {
-        &self.leaves
+    pub(crate) fn leaf_address(&self, place: usize) -> *const u8 {
+        L::address::<S>(&self.leaves, &self.primitives, place)
+    }
+
+    /// The leaf at a place.
+    ///
+    /// # Safety
+    /// A link led there.
+    #[inline(always)]
+    pub(crate) unsafe fn leaf(&self, place: usize) -> L::Ref<'_> {
+        // SAFETY: the check of `from_parts` saw that all leaves led to are there.
+        unsafe { L::at::<S>(&self.leaves, &self.primitives, place) }
     }
 
     /// The number of each primitive in the leaves.
@@ -118,19 +143,6 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
         self.backend = backend;
     }
 
-    /// The same hierarchy, borrowed.
-    pub fn as_borrowed(&self) -> Bvh<N, L, Borrowed<'_>> {
-        Bvh {
-            nodes: &self.nodes,
-            leaves: &self.leaves,
-            primitives: &self.primitives,
-            root: self.root,
-            bounds: self.bounds,
-            backend: self.backend,
-            dropped: self.dropped,
-        }
-    }
-
     /// Notes that the builder left out this many primitives.
     #[cfg(feature = "std")]
     pub(crate) fn with_dropped(self, dropped: u32) -> Self {
@@ -142,9 +154,51 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
         self.dropped as usize
     }
 
+    /// The same nodes and numbers, borrowed, with leaves kept in another way.
+    pub(crate) fn with_leaves<'a, K: Leaves>(
+        &'a self,
+        leaves: K::Store<Borrowed<'a>>,
+    ) -> Bvh<N, K, Borrowed<'a>> {
+        Bvh {
+            nodes: &self.nodes,
+            leaves,
+            primitives: &self.primitives,
+            numbers: self.numbers,
+            root: self.root,
+            bounds: self.bounds,
+            backend: self.backend,
+            dropped: self.dropped,
+        }
+    }
+}
+
+impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
+    /// The leaves.
+    #[inline(always)]
+    pub fn leaves(&self) -> &[L] {
+        &self.leaves
+    }
+
+    /// The same hierarchy, borrowed.
+    pub fn as_borrowed(&self) -> Bvh<N, L, Borrowed<'_>> {
+        self.with_leaves(&*self.leaves)
+    }
+
     /// How many bytes nodes, leaves and primitive numbers take.
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes()) + size_of_val(self.leaves()) + size_of_val(self.primitives())
+    }
+}
+
+impl<N: WideNode, M: Copy, S: Storage> Bvh<N, Runs<M>, S> {
+    /// The same hierarchy, borrowed.
+    pub fn as_borrowed(&self) -> Bvh<N, Runs<M>, Borrowed<'_>> {
+        self.with_leaves(self.leaves)
+    }
+
+    /// How many bytes nodes and primitive numbers take: what there is beside the primitives themselves.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes()) + size_of_val(self.primitives())
     }
 }
 
@@ -156,13 +210,12 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
     }
 }
 
-impl<N: WideNode, L: Leaf, S: Storage> fmt::Debug for Bvh<N, L, S> {
+impl<N: WideNode, L: Leaves, S: Storage> fmt::Debug for Bvh<N, L, S> {
     /// How much there is of each part, not the parts.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Bvh")
             .field("width", &N::WIDTH)
             .field("nodes", &self.nodes.len())
-            .field("leaves", &self.leaves.len())
             .field("primitives", &self.primitives.len())
             .field("bounds", &self.bounds)
             .field("backend", &self.backend)

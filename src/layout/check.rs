@@ -1,6 +1,6 @@
 //! The check that a walk relies on: every place is in range, the nodes are a tree, and it fits the stack.
 
-use super::{Child, ChildKind, Leaf, Link, WideNode};
+use super::{Child, ChildKind, Leaves, Link, Storage, WideNode};
 use crate::geometry::Aabb;
 use core::{error::Error, fmt};
 
@@ -65,29 +65,31 @@ impl fmt::Display for LayoutError {
 impl Error for LayoutError {}
 
 /// Checks everything that walks take for granted, in linear time, and finds the root.
-pub(super) fn check<N: WideNode, L: Leaf>(
+pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     nodes: &[N],
-    leaves: &[L],
+    leaves: &L::Store<S>,
     primitives: &[u32],
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
-    let most = (1 << 31) - 2;
-    let most_nodes = most / (size_of::<N>() / Link::UNIT);
-    if nodes.len() > most_nodes || leaves.len() > most || primitives.len() > u32::MAX as usize {
+    let most_nodes = ((1 << 31) - 2) / (size_of::<N>() / Link::UNIT);
+    if nodes.len() > most_nodes || primitives.len() > u32::MAX as usize {
         return Err(LayoutError::TooLarge);
     }
-    for (index, leaf) in leaves.iter().enumerate() {
-        if !leaf.is_sound() || leaf.primitives().end > primitives.len() as u64 {
-            return Err(LayoutError::Leaf(index));
-        }
+    let count = L::count::<S>(leaves, primitives)?;
+    if nodes.is_empty() {
+        return match L::only(count) {
+            _ if count == 0 => Ok(Child::EMPTY),
+            Some(place) => Ok(Child::leaf(place)),
+            None => Err(LayoutError::UnusedLeaves(0)),
+        };
     }
 
     // How many nodes and leaves have been led to so far: where the next ones must be.
-    let mut next_node = usize::from(!nodes.is_empty());
-    let mut next_leaf = usize::from(nodes.is_empty() && !leaves.is_empty());
+    let mut next_node = 1;
+    let mut next_leaf = 0;
     // Nodes still to be looked at, each with the stack that a walk has in use when it gets there.
     let mut todo = [(0, 0); STACK];
-    let mut len = next_node;
+    let mut len = 1;
     while len > 0 {
         len -= 1;
         let (index, used) = todo[len];
@@ -100,16 +102,22 @@ pub(super) fn check<N: WideNode, L: Leaf>(
         }
         let first_node = next_node;
         for lane in 0..children {
-            let child = node.child(lane);
-            let (expected, count) = match child.kind() {
-                ChildKind::Leaf(_) => (Child::leaf(next_leaf as u32), leaves.len()),
-                _ => (Child::node(next_node as u32), nodes.len()),
+            // SAFETY: the node has so many children.
+            let link = unsafe { node.link(lane) };
+            let fits = if link.is_leaf() {
+                let span = L::span(link.leaf());
+                let follows = span.start == next_leaf;
+                next_leaf = span.end;
+                follows && span.end <= count
+            } else {
+                // Not only its place: a link may lead to the middle of a node.
+                let follows = link == Link::node::<N>(next_node as u32);
+                next_node += 1;
+                follows && next_node <= nodes.len()
             };
-            if child != expected || child.index() >= count {
+            if !fits {
                 return Err(LayoutError::Child { node: index, lane });
             }
-            next_leaf += usize::from(child.is_leaf());
-            next_node += usize::from(!child.is_leaf());
         }
         for child in (first_node..next_node).rev() {
             todo[len] = (child, used);
@@ -119,14 +127,10 @@ pub(super) fn check<N: WideNode, L: Leaf>(
     if next_node < nodes.len() {
         return Err(LayoutError::UnusedNodes(next_node));
     }
-    if next_leaf < leaves.len() {
+    if next_leaf < count {
         return Err(LayoutError::UnusedLeaves(next_leaf));
     }
-    Ok(match (nodes.len(), leaves.len()) {
-        (0, 0) => Child::EMPTY,
-        (0, _) => Child::leaf(0),
-        _ => Child::node(0),
-    })
+    Ok(Child::node(0))
 }
 
 /// How many children a node has: its first lanes, each with a box within `bounds`. The others lead

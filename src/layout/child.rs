@@ -79,11 +79,21 @@ impl Link {
     pub const fn new<N>(child: Child) -> Self {
         const { assert!(size_of::<N>().is_multiple_of(Self::UNIT)) };
         match child.kind() {
-            ChildKind::Node(index) => {
-                Self((index as u32).wrapping_mul(Self::units::<N>()) & !Child::LEAF)
-            }
+            ChildKind::Node(index) => Self::node::<N>(index as u32),
             _ => Self(child.0),
         }
+    }
+
+    /// The link to a node. As [`new`](Self::new), of a place too far away nothing sensible comes.
+    #[inline(always)]
+    pub(crate) const fn node<N>(index: u32) -> Self {
+        Self(index.wrapping_mul(Self::units::<N>()) & !Child::LEAF)
+    }
+
+    /// The link to a leaf's place, of which 31 bits count.
+    #[inline(always)]
+    pub(crate) const fn leaf_at(place: u32) -> Self {
+        Self(place | Child::LEAF)
     }
 
     /// What it leads to.
@@ -106,7 +116,7 @@ impl Link {
         self.0 & Child::LEAF != 0
     }
 
-    /// The place of the leaf it leads to.
+    /// The place of the leaf it leads to, less than 2^31.
     #[inline(always)]
     pub(crate) const fn leaf(self) -> usize {
         (self.0 & !Child::LEAF) as usize

@@ -1,14 +1,15 @@
-//! Leaves: a few triangles that share vertices, or a few of a caller's primitives.
+//! Leaves that are stored: a few triangles that share vertices, or a few of a caller's primitives.
 
+use super::Triangles;
 use crate::{
-    primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
-    simd::{Lanes, Simd, Vector},
+    primitive::triangle::{Corners, RayShear},
+    simd::{Simd, Vector},
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, ops::Range};
 use glam::Vec3;
 
-/// What all leaves have: primitives, as a run of places in the hierarchy's list of primitive numbers.
+/// What all leaves that are stored have: primitives, as a run of places in the hierarchy's list of primitive numbers.
 pub trait Leaf: Pod + Debug {
     /// Which places of the list are its own.
     fn primitives(&self) -> Range<u64>;
@@ -87,43 +88,6 @@ impl TriangleLeaf {
         }
     }
 
-    /// The ray against all its triangles, up to `t_max`. If `NEED_T` is not set, it is enough to know
-    /// whether any is hit.
-    #[inline(always)]
-    pub(crate) fn test<T: Simd, const NEED_T: bool>(
-        &self,
-        token: T,
-        ray: &RayShear<'_, T::F32x8>,
-        t_max: f32,
-    ) -> Option<TriangleHits<T::F32x8>> {
-        let (corners, edges) = self.edges(token, ray);
-        if edges.candidates == 0 {
-            return None;
-        }
-        let t_max = T::F32x8::splat(token, t_max);
-        ray.along(token)
-            .test::<8, NEED_T>(token, corners, edges, t_max)
-    }
-
-    /// Its triangles' corners as the ray sees them, and which of them the ray may hit: what the rest of the test works on.
-    #[inline(always)]
-    pub(crate) fn edges<T: Simd>(
-        &self,
-        token: T,
-        ray: &RayShear<'_, T::F32x8>,
-    ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
-        let vertices = ray.shear(token, &self.vertices);
-        let corners = [
-            self.corners_of(vertices.x),
-            self.corners_of(vertices.y),
-            self.corners_of(vertices.z),
-        ];
-        (
-            corners,
-            ray.along(token).edges::<8>(token, corners, self.lanes()),
-        )
-    }
-
     /// A number of each vertex as that of each triangle's first, second and third corner.
     #[inline(always)]
     fn corners_of<V: Vector<8>>(&self, vertices: V) -> [V; 3] {
@@ -133,23 +97,27 @@ impl TriangleLeaf {
             vertices.permute(&self.corners[2]),
         ]
     }
+}
 
-    /// Where its primitives' numbers begin.
+impl Triangles for &TriangleLeaf {
     #[inline(always)]
-    pub(crate) fn first(&self) -> usize {
+    fn first(self) -> usize {
         self.first as usize
     }
 
-    /// How many triangles there are.
     #[inline(always)]
-    pub(crate) fn count(&self) -> usize {
-        self.count as usize
+    fn count(self) -> usize {
+        self.count as usize & 15
     }
 
-    /// A bit for each triangle there is.
     #[inline(always)]
-    pub(crate) fn lanes(&self) -> u32 {
-        (1 << (self.count & 15)) - 1
+    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
+        let vertices = ray.shear_arrays(token, &self.vertices);
+        [
+            self.corners_of(vertices.x),
+            self.corners_of(vertices.y),
+            self.corners_of(vertices.z),
+        ]
     }
 }
 

@@ -3,18 +3,31 @@
 mod bvh;
 mod check;
 mod child;
+mod compact;
+mod full;
 mod leaf;
+mod leaves;
 mod node;
+mod run;
 mod storage;
 
-pub use bvh::{Bvh, Bvh4Ref, Bvh8Ref, PrimitiveBvh4Ref, PrimitiveBvh8Ref};
+pub use bvh::{
+    Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, PrimitiveBvh4Ref,
+    PrimitiveBvh8Ref,
+};
 #[cfg(feature = "alloc")]
-pub use bvh::{Bvh4, Bvh8, PrimitiveBvh4, PrimitiveBvh8};
+pub use bvh::{Bvh4, Bvh8, CompactBvh4, CompactBvh8, PrimitiveBvh4, PrimitiveBvh8};
 pub use check::LayoutError;
 pub(crate) use check::STACK;
 pub use child::{Child, ChildKind, Link};
+pub use compact::{CompactNode, CompactNode4, CompactNode8};
+pub use full::{Node, Node4, Node8};
 pub use leaf::{Leaf, PrimitiveLeaf, TriangleLeaf};
-pub use node::{Node, Node4, Node8, WideNode};
+pub use leaves::{Leaves, TriangleLeaves, Triangles};
+pub use node::WideNode;
+#[cfg(feature = "std")]
+pub(crate) use run::place as run_place;
+pub use run::{MeshLeaf, MeshTooSmall, RunLeaf, Runs};
 #[cfg(feature = "alloc")]
 pub use storage::Owned;
 pub use storage::{Borrowed, Storage};

@@ -23,7 +23,7 @@ use crate::{
 /// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
 /// no more than to load a vector, and many rays never get to a leaf.
 #[derive(Clone, Copy)]
-pub(crate) struct RayShear<'a, V> {
+pub struct RayShear<'a, V> {
     ray: &'a Ray,
     /// Of the shear.
     axes: &'static [usize; 3],
@@ -113,11 +113,40 @@ impl<'a, V: Copy> RayShear<'a, V> {
 
     /// Moves and shears vertices, given as arrays of x, of y and of z.
     #[inline(always)]
-    pub(crate) fn shear<const N: usize>(
+    pub(crate) fn shear_arrays<const N: usize>(
         &self,
         token: V::Token,
         vertices: &[[f32; N]; 3],
     ) -> Sheared<V>
+    where
+        V: Vector<N>,
+    {
+        let [kx, ky, kz] = *self.axes;
+        // SAFETY: the axes are those of a prepared ray, a permutation of 0 to 2.
+        unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
+        let vertices = [
+            V::load(token, &vertices[kx]),
+            V::load(token, &vertices[ky]),
+            V::load(token, &vertices[kz]),
+        ];
+        self.shear_along(token, vertices)
+    }
+
+    /// The same of vectors.
+    #[inline(always)]
+    pub(crate) fn shear<const N: usize>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
+    where
+        V: Vector<N>,
+    {
+        let [kx, ky, kz] = *self.axes;
+        // SAFETY: as above.
+        unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
+        self.shear_along(token, [vertices[kx], vertices[ky], vertices[kz]])
+    }
+
+    /// The same of vectors along the axes of the shear.
+    #[inline(always)]
+    fn shear_along<const N: usize>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
     where
         V: Vector<N>,
     {
@@ -131,11 +160,6 @@ impl<'a, V: Copy> RayShear<'a, V> {
         let slope = [
             V::splat(token, direction[kx]) * self.reciprocal,
             V::splat(token, direction[ky]) * self.reciprocal,
-        ];
-        let vertices = [
-            V::load(token, &vertices[kx]),
-            V::load(token, &vertices[ky]),
-            V::load(token, &vertices[kz]),
         ];
         Sheared::new(vertices, origin, slope)
     }

@@ -34,6 +34,12 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn coordinates(self, points: [&[f32; 3]; 8]) -> [F32x8; 3] {
+        // SAFETY: the token says that the instructions are there.
+        unsafe { coordinates(points) }
+    }
+
+    #[inline(always)]
     fn prefetch(self, address: *const u8) {
         for line in 0..3 {
             // SAFETY: the token says that the instructions are there; a prefetch never faults.
@@ -67,7 +73,7 @@ macro_rules! impl_vector {
     (
         $vector:ident, $n:literal, $splat:ident, $load:ident, $store:ident,
         $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident, $or:ident, $andnot:ident,
-        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident
+        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident
     ) => {
         impl_operator!($vector, Add, add, $add);
         impl_operator!($vector, Sub, sub, $sub);
@@ -113,6 +119,10 @@ macro_rules! impl_vector {
             #[inline(always)]
             fn load(_: Avx2, lanes: &[f32; $n]) -> Self {
                 Self(unsafe { $load(lanes.as_ptr()) })
+            }
+            #[inline(always)]
+            fn of_bytes(_: Avx2, bytes: &[u8; $n]) -> Self {
+                Self(unsafe { $of_bytes(bytes) })
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, addend: Self) -> Self {
@@ -175,7 +185,8 @@ impl_vector!(
     _mm_movemask_ps,
     permute4,
     least4,
-    of_bits4
+    of_bits4,
+    of_bytes4
 );
 
 impl_vector!(
@@ -199,7 +210,8 @@ impl_vector!(
     _mm256_movemask_ps,
     permute8,
     least8,
-    of_bits8
+    of_bits8,
+    of_bytes8
 );
 
 /// For a mask of lanes, their numbers in order.
@@ -234,6 +246,20 @@ fn permute4(vector: __m128, lanes: &[u8; 4]) -> __m128 {
 fn permute8(vector: __m256, lanes: &[u8; 8]) -> __m256 {
     let lanes = _mm_cvtsi64_si128(i64::from_le_bytes(*lanes));
     _mm256_permutevar8x32_ps(vector, _mm256_cvtepu8_epi32(lanes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn of_bytes4(bytes: &[u8; 4]) -> __m128 {
+    let bytes = _mm_cvtsi32_si128(i32::from_le_bytes(*bytes));
+    _mm_cvtepi32_ps(_mm_cvtepu8_epi32(bytes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn of_bytes8(bytes: &[u8; 8]) -> __m256 {
+    let bytes = _mm_cvtsi64_si128(i64::from_le_bytes(*bytes));
+    _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(bytes))
 }
 
 #[inline]
@@ -285,6 +311,41 @@ fn least_key(keys: __m128i) -> usize {
     let pairs = _mm_min_epi32(keys, _mm_shuffle_epi32::<0b01_00_11_10>(keys));
     let least = _mm_min_epi32(pairs, _mm_shuffle_epi32::<0b10_11_00_01>(pairs));
     (_mm_cvtsi128_si32(least) & 7) as usize
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn coordinates(points: [&[f32; 3]; 8]) -> [F32x8; 3] {
+    let three = _mm_setr_epi32(-1, -1, -1, 0);
+    // SAFETY: three floats of each.
+    let row = unsafe {
+        [
+            _mm_maskload_ps(points[0].as_ptr(), three),
+            _mm_maskload_ps(points[1].as_ptr(), three),
+            _mm_maskload_ps(points[2].as_ptr(), three),
+            _mm_maskload_ps(points[3].as_ptr(), three),
+            _mm_maskload_ps(points[4].as_ptr(), three),
+            _mm_maskload_ps(points[5].as_ptr(), three),
+            _mm_maskload_ps(points[6].as_ptr(), three),
+            _mm_maskload_ps(points[7].as_ptr(), three),
+        ]
+    };
+    // A point and the fourth after it in each half.
+    let (a, b) = (
+        _mm256_set_m128(row[4], row[0]),
+        _mm256_set_m128(row[5], row[1]),
+    );
+    let (c, d) = (
+        _mm256_set_m128(row[6], row[2]),
+        _mm256_set_m128(row[7], row[3]),
+    );
+    let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+    let (abz, cdz) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+    [
+        F32x8(_mm256_shuffle_ps::<0b01_00_01_00>(ab, cd)),
+        F32x8(_mm256_shuffle_ps::<0b11_10_11_10>(ab, cd)),
+        F32x8(_mm256_shuffle_ps::<0b01_00_01_00>(abz, cdz)),
+    ]
 }
 
 #[inline]

@@ -39,6 +39,23 @@ pub trait Simd: Copy {
         ]
     }
 
+    /// Eight points' x, y and z.
+    #[inline(always)]
+    fn coordinates(self, points: [&[f32; 3]; 8]) -> [Self::F32x8; 3] {
+        let mut axes = [[0.0; 8]; 3];
+        for (lane, point) in points.into_iter().enumerate() {
+            for (axis, &x) in axes.iter_mut().zip(point) {
+                axis[lane] = x;
+            }
+        }
+        let [x, y, z] = &axes;
+        [
+            Self::F32x8::load(self, x),
+            Self::F32x8::load(self, y),
+            Self::F32x8::load(self, z),
+        ]
+    }
+
     /// Has the three cache lines from `address` on fetched, if the backend can. Any address will do.
     fn prefetch(self, address: *const u8);
 }
@@ -82,6 +99,15 @@ pub trait Vector<const N: usize>:
 {
     /// One lane from each element.
     fn load(token: Self::Token, lanes: &[f32; N]) -> Self;
+    /// The same from integers.
+    #[inline(always)]
+    fn of_bytes(token: Self::Token, bytes: &[u8; N]) -> Self {
+        let mut lanes = [0.0; N];
+        for (lane, &byte) in lanes.iter_mut().zip(bytes) {
+            *lane = f32::from(byte);
+        }
+        Self::load(token, &lanes)
+    }
 
     /// `self * factor + addend`, rounded once or twice.
     fn mul_add(self, factor: Self, addend: Self) -> Self;

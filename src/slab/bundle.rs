@@ -10,7 +10,7 @@
 //! Interval arithmetic over a bundle: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005); Wald et al.,
 //! "Ray tracing deformable scenes using dynamic bounding volume hierarchies" (2007).
 
-use super::{Planes, UNIT_ROUNDOFF, first_planes, load_planes};
+use super::{FirstPlanes, UNIT_ROUNDOFF};
 use crate::simd::{Lanes, Vector, splat3};
 use glam::Vec3;
 
@@ -104,22 +104,21 @@ impl<V: Lanes> Bundling<V> {
 }
 
 impl BundleSlabs {
-    /// Which of the boxes any of the rays may meet up to `t_max`, raised by their margins, and from which `t` on.
+    /// Which side's planes are met first.
+    #[inline(always)]
+    pub(crate) fn first<const N: usize>(&self) -> FirstPlanes<N> {
+        FirstPlanes::new(self.direction)
+    }
+
+    /// Which of the boxes any of the rays may meet up to `t_max`, raised by their margins, and from which `t` on: of the
+    /// planes that are met first and those that are met last.
     #[inline(always)]
     pub(crate) fn test<const N: usize, V: Vector<N>>(
         &self,
         token: V::Token,
-        planes: &Planes<N>,
+        [near, far]: [[V; 3]; 2],
         t_max: V,
     ) -> (V, V) {
-        let side = size_of::<[f32; N]>();
-        let first = [
-            first_planes(0, self.direction.x, side),
-            first_planes(1, self.direction.y, side),
-            first_planes(2, self.direction.z, side),
-        ];
-        // SAFETY: `first` is from `first_planes`.
-        let [near, far]: [[V; 3]; 2] = unsafe { load_planes(token, planes, first) };
         let (mut enter, mut leave) = (V::splat(token, self.t_min), t_max);
         for axis in 0..3 {
             let center = V::splat(token, self.center[axis]);

@@ -123,9 +123,6 @@ fn plane_terms<const N: usize, V: Vector<N>>(
     (at_origin - error, at_origin + error)
 }
 
-/// The planes of `N` boxes: by axis, then `min` and `max`, then box.
-pub type Planes<const N: usize> = [[[f32; N]; 2]; 3];
-
 impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
     /// For boxes within `bounds`. `reciprocal` is [`PreparedRay::reciprocals`], narrowed.
     #[inline(always)]
@@ -223,15 +220,14 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         }
     }
 
-    /// Which of the boxes the ray may meet up to `t_max`, raised by the margin, and from which `t` on.
+    /// Which side's planes are met first.
     #[inline(always)]
-    pub(crate) fn test(&self, token: V::Token, planes: &Planes<N>, t_max: V) -> (V, V) {
-        // SAFETY: `first` is from `first_planes`: either side of an axis.
-        let [near, far] = unsafe { load_planes(token, planes, self.first) };
-        self.between(near, far, t_max)
+    pub(crate) fn first(&self) -> FirstPlanes<N> {
+        FirstPlanes(self.first)
     }
 
-    /// The same, of the planes that are met first and those that are met last.
+    /// Which of the boxes the ray may meet up to `t_max`, raised by the margin, and from which `t` on: of the planes that
+    /// are met first and those that are met last.
     #[inline(always)]
     pub(crate) fn between(&self, near: [V; 3], far: [V; 3], t_max: V) -> (V, V) {
         let [rx, ry, rz] = self.reciprocal;
@@ -250,32 +246,46 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
     const SIDE: usize = size_of::<[f32; N]>();
 }
 
-/// The planes that are met first, and those that are met last.
-///
-/// # Safety
-/// `first` are from [`first_planes`], for as many planes a side.
-#[inline(always)]
-unsafe fn load_planes<const N: usize, V: Vector<N>>(
-    token: V::Token,
-    planes: &Planes<N>,
-    first: [usize; 3],
-) -> [[V; 3]; 2] {
-    let side = size_of::<[f32; N]>();
-    let planes: *const [f32; N] = planes.as_ptr().cast();
-    // SAFETY: the caller's promise: either side of each axis.
-    unsafe {
+/// Which side's planes rays of some direction meet first, by axis, in a node of `N` children: how many bytes after the
+/// first they are, were they floats.
+#[derive(Clone, Copy)]
+pub struct FirstPlanes<const N: usize>([usize; 3]);
+
+impl<const N: usize> FirstPlanes<N> {
+    #[inline(always)]
+    pub(crate) fn new(direction: Vec3) -> Self {
+        let side = size_of::<[f32; N]>();
+        Self([
+            first_planes(0, direction.x, side),
+            first_planes(1, direction.y, side),
+            first_planes(2, direction.z, side),
+        ])
+    }
+
+    /// The planes that are met first, by axis, and those that are met last; whatever they are written as.
+    #[inline(always)]
+    pub(crate) fn pick<P>(self, planes: &[[[P; N]; 2]; 3]) -> [[&[P; N]; 3]; 2] {
+        let Self([x, y, z]) = self;
+        let other = size_of::<[f32; N]>();
         [
             [
-                V::load(token, &*planes.byte_add(first[0])),
-                V::load(token, &*planes.byte_add(first[1])),
-                V::load(token, &*planes.byte_add(first[2])),
+                Self::at(planes, x),
+                Self::at(planes, y),
+                Self::at(planes, z),
             ],
             [
-                V::load(token, &*planes.byte_add(first[0] ^ side)),
-                V::load(token, &*planes.byte_add(first[1] ^ side)),
-                V::load(token, &*planes.byte_add(first[2] ^ side)),
+                Self::at(planes, x ^ other),
+                Self::at(planes, y ^ other),
+                Self::at(planes, z ^ other),
             ],
         ]
+    }
+
+    #[inline(always)]
+    fn at<P>(planes: &[[[P; N]; 2]; 3], place: usize) -> &[P; N] {
+        let planes: *const [P; N] = planes.as_ptr().cast();
+        // SAFETY: `place` is from `first_planes`, or the other side's: one of six.
+        unsafe { &*planes.byte_add(place * size_of::<P>() / size_of::<f32>()) }
     }
 }
 

@@ -10,7 +10,7 @@
 use super::{query::Query, triangles::Found};
 use crate::{
     geometry::{Aabb, Ray},
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, WideNode},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, Triangles, WideNode},
     primitive::triangle::{Along, RayShear, Sheared, bits},
     simd::{Lanes, Simd, Vector, splat3},
     slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocal},
@@ -195,7 +195,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 for lane in bits(hit.bits()) {
                     // SAFETY: `hit` has bits for the node's lanes alone, `near` is of as many.
                     let (link, near) = unsafe {
-                        let link = *node.links().get_unchecked(lane);
+                        let link = node.link(lane);
                         (link, *near.as_ref().get_unchecked(lane))
                     };
                     token.prefetch(if link.is_leaf() {

@@ -1,7 +1,7 @@
 //! What a query cost.
 
 use super::single::Visitor;
-use crate::layout::Leaf;
+use crate::layout::Leaves;
 use core::ops::ControlFlow;
 
 /// How much a query looked at.
@@ -21,7 +21,7 @@ pub(super) struct Counting<V> {
     pub(super) counts: Counts,
 }
 
-impl<L: Leaf, V: Visitor<L>> Visitor<L> for Counting<V> {
+impl<L: Leaves, V: Visitor<L>> Visitor<L> for Counting<V> {
     const NEAREST_FIRST: bool = V::NEAREST_FIRST;
 
     #[inline(always)]
@@ -31,10 +31,9 @@ impl<L: Leaf, V: Visitor<L>> Visitor<L> for Counting<V> {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, leaf: &L) -> ControlFlow<(), f32> {
-        let primitives = leaf.primitives();
+    fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32> {
         self.counts.leaves += 1;
-        self.counts.triangles += (primitives.end - primitives.start) as u32;
+        self.counts.triangles += L::primitives(leaf) as u32;
         self.visitor.leaf(leaf)
     }
 }

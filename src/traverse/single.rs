@@ -2,13 +2,13 @@
 
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Child, Leaf, Link, STACK, Storage, WideNode},
+    layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
     simd::{Lanes, Simd},
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
 
 /// What is done on the way.
-pub(crate) trait Visitor<L> {
+pub(crate) trait Visitor<L: Leaves> {
     /// Whether children are wanted the nearest first. Any order will do to find out that something is
     /// in the way.
     const NEAREST_FIRST: bool;
@@ -18,7 +18,7 @@ pub(crate) trait Visitor<L> {
     fn node(&mut self) {}
 
     /// A leaf is reached. The `t` up to which to look on, or `Break` if enough is known.
-    fn leaf(&mut self, leaf: &L) -> ControlFlow<(), f32>;
+    fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32>;
 }
 
 /// A child to come back to, and the `t` from which on the ray is in its box: the bits of `t` above those
@@ -50,7 +50,7 @@ type Stack = [MaybeUninit<Entry>; STACK];
 /// Takes `visitor` to every leaf whose box the ray passes within its range, which shrinks on the way. The ray is a
 /// prepared one's, and so are the reciprocals of its direction.
 #[inline(always)]
-pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
+pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
     token: T,
     bvh: &Bvh<N, L, S>,
     ray: &Ray,
@@ -60,7 +60,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
     if bvh.root() == Child::EMPTY {
         return;
     }
-    let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves());
+    let nodes = bvh.nodes().as_ptr();
     let slabs = N::slabs(token, ray, reciprocal, bvh.bounds());
     let margin = N::margin(&slabs);
     let mut t_max = ray.t_max + margin;
@@ -85,15 +85,14 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
             let first = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             // SAFETY: `mask` has bits for the node's lanes alone.
-            current = unsafe { *node.links().get_unchecked(first) };
+            current = unsafe { node.link(first) };
             if mask == 0 {
                 continue;
             }
             let near = near.to_array();
             // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
             let entry = |lane: usize| unsafe {
-                let link = *node.links().get_unchecked(lane);
-                Entry::new(*near.as_ref().get_unchecked(lane), link)
+                Entry::new(*near.as_ref().get_unchecked(lane), node.link(lane))
             };
             let mut nearest = entry(first);
             let base = len;
@@ -109,7 +108,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
                 };
                 let link = farther.link();
                 token.prefetch(if link.is_leaf() {
-                    leaves.as_ptr().wrapping_add(link.leaf()).cast()
+                    bvh.leaf_address(link.leaf())
                 } else {
                     nodes.wrapping_byte_add(link.node_offset()).cast()
                 });
@@ -129,7 +128,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaf, S: Storage, V: Visitor<L>>(
         }
 
         // SAFETY: the layout's check saw that all leaves led to are there.
-        let leaf = unsafe { leaves.get_unchecked(current.leaf()) };
+        let leaf = unsafe { bvh.leaf(current.leaf()) };
         match visitor.leaf(leaf) {
             ControlFlow::Break(()) => return,
             ControlFlow::Continue(t) => t_max = t + margin,

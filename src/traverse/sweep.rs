@@ -4,7 +4,7 @@
 
 use crate::{
     geometry::{Aabb, Ray},
-    layout::{TriangleLeaf, WideNode},
+    layout::{TriangleLeaf, Triangles, WideNode},
     primitive::triangle::RayShear,
     simd::{Backend, Lanes, Operation, Simd},
     slab::PreparedRay,

@@ -7,14 +7,14 @@ use super::{
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Storage, TriangleLeaf, WideNode},
+    layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{RayShear, TriangleHits, bits},
     simd::{Lanes, Operation, Simd},
     slab::{PreparedRay, unscaled},
 };
 use core::ops::ControlFlow;
 
-impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// The closest triangle that the ray hits: of all within its range the one of least `t`, of equal
     /// ones the one of least number.
     #[inline]
@@ -58,7 +58,7 @@ impl Found {
         token: T,
         best: &mut Option<Self>,
         t_max: &mut f32,
-        leaf: &TriangleLeaf,
+        leaf: impl Triangles,
         shear: &RayShear<'_, T::F32x8>,
         primitives: &[u32],
     ) -> bool {
@@ -74,7 +74,7 @@ impl Found {
     pub(super) fn choose<T: Simd>(
         best: &mut Option<Self>,
         t_max: &mut f32,
-        leaf: &TriangleLeaf,
+        leaf: impl Triangles,
         hits: TriangleHits<T::F32x8>,
         primitives: &[u32],
     ) -> bool {
@@ -112,12 +112,12 @@ impl Found {
     }
 }
 
-struct Closest<'a, N: WideNode, S: Storage> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Closest<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
     ray: &'a Ray,
 }
 
-impl<N: WideNode, S: Storage> Operation for Closest<'_, N, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Closest<'_, N, L, S> {
     type Output = Option<Hit>;
 
     #[inline(always)]
@@ -131,12 +131,12 @@ impl<N: WideNode, S: Storage> Operation for Closest<'_, N, S> {
     }
 }
 
-struct ClosestCounted<'a, N: WideNode, S: Storage> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct ClosestCounted<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
     ray: &'a Ray,
 }
 
-impl<N: WideNode, S: Storage> Operation for ClosestCounted<'_, N, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for ClosestCounted<'_, N, L, S> {
     type Output = (Option<Hit>, Counts);
 
     #[inline(always)]
@@ -156,12 +156,12 @@ impl<N: WideNode, S: Storage> Operation for ClosestCounted<'_, N, S> {
     }
 }
 
-struct Any<'a, N: WideNode, S: Storage> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Any<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
     ray: &'a Ray,
 }
 
-impl<N: WideNode, S: Storage> Operation for Any<'_, N, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Any<'_, N, L, S> {
     type Output = bool;
 
     #[inline(always)]
@@ -177,12 +177,12 @@ impl<N: WideNode, S: Storage> Operation for Any<'_, N, S> {
     }
 }
 
-struct AnyCounted<'a, N: WideNode, S: Storage> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct AnyCounted<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
     ray: &'a Ray,
 }
 
-impl<N: WideNode, S: Storage> Operation for AnyCounted<'_, N, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for AnyCounted<'_, N, L, S> {
     type Output = (bool, Counts);
 
     #[inline(always)]
@@ -234,11 +234,11 @@ impl<'a, T: Simd> ClosestVisitor<'a, T> {
     }
 }
 
-impl<T: Simd> Visitor<TriangleLeaf> for ClosestVisitor<'_, T> {
+impl<L: TriangleLeaves, T: Simd> Visitor<L> for ClosestVisitor<'_, T> {
     const NEAREST_FIRST: bool = true;
 
     #[inline(always)]
-    fn leaf(&mut self, leaf: &TriangleLeaf) -> ControlFlow<(), f32> {
+    fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32> {
         let Self {
             token,
             shear,
@@ -270,11 +270,11 @@ impl<'a, T: Simd> AnyVisitor<'a, T> {
     }
 }
 
-impl<T: Simd> Visitor<TriangleLeaf> for AnyVisitor<'_, T> {
+impl<L: TriangleLeaves, T: Simd> Visitor<L> for AnyVisitor<'_, T> {
     const NEAREST_FIRST: bool = false;
 
     #[inline(always)]
-    fn leaf(&mut self, leaf: &TriangleLeaf) -> ControlFlow<(), f32> {
+    fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32> {
         if leaf
             .test::<T, false>(self.token, &self.shear, self.t_max)
             .is_some()

@@ -14,7 +14,7 @@
 use super::{query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, WideNode},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, Triangles, WideNode},
     primitive::triangle::{Corners, Edges, RayShear},
     simd::{Lanes, Simd},
     slab::{NarrowSlabs, PreparedRay, SceneExtent},
@@ -268,7 +268,7 @@ impl Lane {
                 links.compress(mask, above_links);
                 (31 ^ (mask | 1).leading_zeros()) as usize
             };
-            let child = *node.links().get_unchecked(child % N::WIDTH);
+            let child = node.link(child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
         self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);

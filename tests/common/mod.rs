@@ -9,7 +9,9 @@ use proptest::{
 use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
+    layout::{
+        Bvh, CompactNode4, CompactNode8, Node4, Node8, Owned, RunLeaf, TriangleLeaf, WideNode,
+    },
     reference,
     simd::Backend,
 };
@@ -59,6 +61,9 @@ impl Variants {
             let bvh = builder.build_as::<Node4>(&mesh).unwrap();
             add(&mut queries, name(4), bvh);
         }
+        let (p, i) = (&positions, &indices);
+        add_compact::<CompactNode8>(&mut queries, p, i, builder.build_compact(&mesh).unwrap());
+        add_compact::<CompactNode4>(&mut queries, p, i, builder.build_compact(&mesh).unwrap());
         Self {
             positions,
             indices,
@@ -121,6 +126,26 @@ fn add<N: WideNode + Sync>(
 ) {
     let query = move |ray: &Ray| (bvh.closest_hit(ray), bvh.any_hit(ray));
     queries.push((name, Box::new(query)));
+}
+
+fn add_compact<N: WideNode + Sync>(
+    queries: &mut Vec<Query>,
+    positions: &[[f32; 3]],
+    indices: &[[u32; 3]],
+    compact: Bvh<N, RunLeaf, Owned>,
+) {
+    for backend in Backend::available() {
+        let mut compact = compact.clone();
+        compact.set_backend(backend);
+        let (positions, indices) = (positions.to_vec(), indices.to_vec());
+        let query = move |ray: &Ray| {
+            let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+            let bvh = compact.over(&mesh).unwrap();
+            (bvh.closest_hit(ray), bvh.any_hit(ray))
+        };
+        let name = format!("compact {}-wide, {}", N::WIDTH, backend.name());
+        queries.push((name, Box::new(query)));
+    }
 }
 
 /// A hit as bits, for -0 to differ from 0.

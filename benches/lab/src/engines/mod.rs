@@ -5,6 +5,7 @@
 //! only in how they trace share a tree.
 
 mod bvh;
+mod compact;
 mod embree;
 mod obvhs;
 mod parry;
@@ -76,11 +77,15 @@ pub type Chosen<'a> = &'a dyn Fn(&str) -> bool;
 ///
 /// # Errors
 /// An engine cannot be built.
-pub fn all(
-    mesh: &TriangleMesh<'_>,
+pub fn all<'m>(
+    mesh: &TriangleMesh<'m>,
     chosen: Chosen<'_>,
-) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
-    let mut engines = wide_bvh::engines(mesh, chosen)?;
+) -> Result<Vec<Box<dyn Engine + 'm>>, Box<dyn Error>> {
+    let mut engines: Vec<Box<dyn Engine + 'm>> = Vec::new();
+    for engine in wide_bvh::engines(mesh, chosen)? {
+        engines.push(engine);
+    }
+    engines.extend(compact::engines(mesh, chosen)?);
     engines.extend(embree::engines(mesh, chosen)?);
     engines.extend(obvhs::engines(mesh, chosen));
     engines.extend(bvh::engine(mesh, chosen));

@@ -37,7 +37,7 @@ pub struct Errors {
 pub fn measure(
     truth: &Truth<'_>,
     set: &RaySet,
-    engines: &[Box<dyn Engine>],
+    engines: &[Box<dyn Engine + '_>],
     rounds: usize,
     progress: &ProgressBar,
 ) -> Vec<Outcome> {

@@ -126,11 +126,11 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 /// Every variant over `mesh`, which `bvh` was built on.
-fn variants(
-    mesh: &TriangleMesh<'_>,
+fn variants<'m>(
+    mesh: &TriangleMesh<'m>,
     bvh: &Bvh8,
     args: &Args,
-) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
+) -> Result<Vec<Box<dyn Engine + 'm>>, Box<dyn Error>> {
     let chosen = |name: &str| {
         args.variants.is_empty()
             || args

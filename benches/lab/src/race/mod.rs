@@ -189,7 +189,7 @@ struct Score {
 /// One workload, by every engine; `rounds + 1` steps for each.
 fn measure(
     Trial { workload, sample }: &Trial,
-    engines: &[Box<dyn Engine>],
+    engines: &[Box<dyn Engine + '_>],
     rounds: usize,
     progress: &ProgressBar,
 ) -> Vec<Score> {

@@ -7,7 +7,7 @@ use std::error::Error;
 /// One scene: a record of each engine on each workload.
 pub fn race(
     course: &Course<'_>,
-    engines: &[Box<dyn Engine>],
+    engines: &[Box<dyn Engine + '_>],
     effort: &Effort,
 ) -> Result<Vec<Record>, Box<dyn Error>> {
     let progress = progress(course.trials.len() * engines.len() * (effort.rounds + 1))?;

@@ -19,6 +19,8 @@ pub const BUILD_QUALITY_MEDIUM: c_int = 1;
 pub const BUILD_QUALITY_HIGH: c_int = 2;
 /// `RTC_SCENE_FLAG_NONE`.
 pub const SCENE_FLAG_NONE: c_int = 0;
+/// `RTC_SCENE_FLAG_COMPACT`.
+pub const SCENE_FLAG_COMPACT: c_int = 1 << 1;
 /// `RTC_SCENE_FLAG_ROBUST`.
 pub const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 /// `RTC_GEOMETRY_TYPE_TRIANGLE`.

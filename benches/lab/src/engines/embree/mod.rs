@@ -53,7 +53,7 @@ pub fn about() -> Result<String, EmbreeError> {
 const HOW_TO_INSTALL: &str = "Embree is not installed, so the race goes on without it: it takes \
     libembree4 or libembree3 (Debian and Ubuntu: apt-get install libembree-dev)";
 
-/// Trees of one thread. HIGH has all calls, the others single rays alone: in the robust mode, on AVX2 where
+/// Trees of one thread. HIGH has all calls, the others single rays alone: in the robust mode and the compact one, on AVX2 where
 /// the ordinary one would use AVX-512, and of MEDIUM quality. None without Embree.
 ///
 /// # Errors
@@ -74,12 +74,17 @@ pub fn engines(
         quality: ffi::BUILD_QUALITY_MEDIUM,
         ..high
     };
+    let compact = Recipe {
+        flags: ffi::SCENE_FLAG_COMPACT,
+        ..high
+    };
     let avx2 = Recipe { avx2: true, ..high };
     let device = high.device(api)?;
     let single = vec![Call::Single];
     let mut trees = vec![
         ("embree HIGH", high, Call::all(&device)),
         ("embree HIGH robust", robust, single.clone()),
+        ("embree HIGH compact", compact, single.clone()),
         ("embree MEDIUM", medium, single.clone()),
     ];
     if device.has_avx512() {

@@ -1,0 +1,44 @@
+//! Compact hierarchies from full ones: the same tree, its boxes on the grids of the nodes.
+
+use crate::{
+    geometry::Aabb,
+    layout::{
+        Bvh, Child, ChildKind, LayoutError, Owned, PrimitiveLeaf, RunLeaf, WideNode, run_place,
+    },
+};
+use std::vec::Vec;
+
+/// A hierarchy of nodes as wide, of the same boxes or somewhat larger ones.
+///
+/// # Errors
+/// More primitive numbers than links tell apart.
+pub(super) fn compact<N: WideNode, C: WideNode>(
+    full: &Bvh<N, PrimitiveLeaf, Owned>,
+) -> Result<Bvh<C, RunLeaf, Owned>, LayoutError> {
+    let place = |child: Child| match child.kind() {
+        ChildKind::Leaf(leaf) => {
+            let range = full.leaves()[leaf].range();
+            Child::leaf(run_place(range.start as u32, range.len() as u32))
+        }
+        _ => child,
+    };
+    let node = |node: &N| {
+        let children = (0..N::WIDTH).map(|lane| (node.child_aabb(lane), place(node.child(lane))));
+        let is_node = |&(_, child): &(Aabb, Child)| matches!(child.kind(), ChildKind::Node(_));
+        let is_leaf = |&(_, child): &(Aabb, Child)| matches!(child.kind(), ChildKind::Leaf(_));
+        // Nodes first. The order among them, and that among leaves, is what the layout's is made of, and stays.
+        C::from_children(
+            children
+                .clone()
+                .filter(is_node)
+                .chain(children.filter(is_leaf)),
+        )
+    };
+    let nodes: Vec<C> = full.nodes().iter().map(node).collect();
+    let boxes = nodes
+        .iter()
+        .flat_map(|node| (0..C::WIDTH).map(|lane| node.child_aabb(lane)));
+    let bounds = boxes.fold(*full.bounds(), Aabb::join);
+    let compact = Bvh::from_parts(nodes, (), full.primitives().to_vec(), bounds)?;
+    Ok(compact.with_dropped(full.dropped() as u32))
+}

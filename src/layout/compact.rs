@@ -1,0 +1,332 @@
+//! Compact nodes: boxes in 8 bits a plane, on a grid of the node's own.
+//!
+//! After Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017). A
+//! plane is `origin + number · step`, `step` a power of two: the product is exact, so what is tested is that sum
+//! rounded once, whether or not the processor fuses the two. The numbers are chosen such that the rounded planes
+//! hold the child, and the slab test's proof holds for them as for any others.
+
+use super::{Child, ChildKind, Link, node::impl_wide_node};
+use crate::{
+    geometry::{Aabb, Ray},
+    layout::run,
+    simd::{Simd, Vector},
+    slab::{BundleSlabs, FirstPlanes, NarrowSlabs, RaySlabs, pow2},
+};
+use bytemuck::{Pod, Zeroable};
+use core::fmt::Debug;
+use glam::Vec3;
+
+/// `W` children, first those that are nodes, side by side in memory, then those that are leaves, whose primitives are
+/// side by side in the hierarchy's list.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct CompactNode<const W: usize, H> {
+    frame: Frame,
+    head: H,
+    planes: [[[u8; W]; 2]; 3],
+}
+
+/// Up to 4 children in 48 bytes.
+pub type CompactNode4 = CompactNode<4, Head4>;
+/// Up to 8 children in 80 bytes.
+pub type CompactNode8 = CompactNode<8, Head8>;
+
+impl_wide_node!(CompactNode4, 4, F32x4, 48, S::low);
+impl_wide_node!(CompactNode8, 8, F32x8, 80, core::convert::identity);
+
+/// The grid of a node's planes, by axis.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Frame {
+    origin: [f32; 3],
+    /// The exponents of the steps, as floats have them.
+    steps: [u8; 3],
+    /// The head's.
+    more: u8,
+}
+
+/// Coordinates are cut off here. No box test looks at planes of such scenes: see [`slab`](crate::slab), (6).
+const MOST: f32 = pow2(100);
+/// The exponent of the least step there is, 2^-100: that of a denormal is lost where a program flushes those.
+const LEAST_STEP: u8 = 27;
+
+impl Frame {
+    /// The grid for `aabbs`, and the planes on it. Lanes without a box have planes of no meaning.
+    fn new<const W: usize>(aabbs: &[Aabb]) -> (Self, [[[u8; W]; 2]; 3]) {
+        let mut frame = Self::zeroed();
+        let mut planes = [[[0; W]; 2]; 3];
+        for axis in 0..3 {
+            let side = |x: f32| x.clamp(-MOST, MOST) + 0.0;
+            let lo = |aabb: &Aabb| side(aabb.min[axis]);
+            let hi = |aabb: &Aabb| side(aabb.max[axis]);
+            let origin = aabbs.iter().map(lo).fold(MOST, f32::min);
+            let end = aabbs.iter().map(hi).fold(-MOST, f32::max);
+            frame.origin[axis] = origin;
+            let step = (f64::from(end) - f64::from(origin)) / 255.0;
+            frame.steps[axis] = ((step as f32).to_bits() >> 23).max(LEAST_STEP.into()) as u8;
+            // The step was rounded down to a power of two; and so is the plane, to a float.
+            while frame.above(axis, end).is_none() {
+                frame.steps[axis] += 1;
+            }
+            let [los, his] = &mut planes[axis];
+            for (lane, aabb) in aabbs.iter().enumerate().take(W) {
+                los[lane] = frame.below(axis, lo(aabb));
+                his[lane] = frame.above(axis, hi(aabb)).unwrap_or(u8::MAX);
+            }
+        }
+        (frame, planes)
+    }
+
+    /// The number of the last plane that is not above `x`, which is not below the first.
+    fn below(&self, axis: usize, x: f32) -> u8 {
+        let mut number = self.number(axis, x);
+        while number > 0 && self.plane(axis, number) > x {
+            number -= 1;
+        }
+        number
+    }
+
+    /// The number of the first plane that is not below `x`, if there is one.
+    fn above(&self, axis: usize, x: f32) -> Option<u8> {
+        let mut number = self.number(axis, x);
+        while self.plane(axis, number) < x {
+            number = number.checked_add(1)?;
+        }
+        Some(number)
+    }
+
+    /// The number of a plane near `x`.
+    fn number(&self, axis: usize, x: f32) -> u8 {
+        let along = f64::from(x) - f64::from(self.origin[axis]);
+        (along / f64::from(self.step(axis))) as u8
+    }
+
+    #[inline(always)]
+    fn step(&self, axis: usize) -> f32 {
+        f32::from_bits(u32::from(self.steps[axis]) << 23)
+    }
+
+    #[inline(always)]
+    fn plane(&self, axis: usize, number: u8) -> f32 {
+        f32::from(number) * self.step(axis) + self.origin[axis]
+    }
+}
+
+/// Where a compact node's children are. Leaves have up to 8 primitives.
+pub trait Head: Pod + Debug {
+    /// The head, and its byte in the frame, of a node whose child nodes begin at `nodes` and whose primitives begin at
+    /// `units`. `counts` are the primitives of each child, none of a node.
+    #[doc(hidden)]
+    fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8);
+    /// How many children there are.
+    #[doc(hidden)]
+    fn children(&self, more: u8) -> usize;
+    /// Where a child is. `N` are the nodes.
+    #[doc(hidden)]
+    fn link<N>(&self, more: u8, lane: usize) -> Link;
+}
+
+/// The place of the first child that is a node; the first primitive of those that are leaves; for each child how many
+/// primitives there are up to its end, 0 for nodes. The frame's byte is the number of children.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Head8 {
+    nodes: u32,
+    units: u32,
+    ends: [u8; 8],
+}
+
+impl Head for Head8 {
+    fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8) {
+        let mut ends = [0; 8];
+        let mut end = 0;
+        for (lane, &count) in counts.iter().enumerate().take(8) {
+            end += count;
+            ends[lane] = end;
+        }
+        let head = Self { nodes, units, ends };
+        (head, counts.len() as u8)
+    }
+
+    #[inline(always)]
+    fn children(&self, more: u8) -> usize {
+        more as usize
+    }
+
+    #[inline(always)]
+    fn link<N>(&self, _: u8, lane: usize) -> Link {
+        let ends = u64::from_le_bytes(self.ends);
+        let (lane, bits) = (lane as u32 % 8, lane as u32 % 8 * 8);
+        let (start, end) = ((ends << 8) >> bits & 0xff, ends >> bits & 0xff);
+        if end == 0 {
+            return Link::node::<N>(self.nodes.wrapping_add(lane));
+        }
+        leaf(self.units, start as u32, end as u32)
+    }
+}
+
+/// The same in less: the two places have 28 bits, above which stand the counts of the first two children, those of
+/// the others are the frame's byte. 0 is a node, 15 is no child.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Head4 {
+    nodes: u32,
+    units: u32,
+}
+
+impl Head4 {
+    const PLACE: u32 = (1 << 28) - 1;
+
+    /// 4 bits a child.
+    #[inline(always)]
+    fn counts(&self, more: u8) -> u32 {
+        self.nodes >> 28 | self.units >> 28 << 4 | u32::from(more) << 8
+    }
+}
+
+impl Head for Head4 {
+    fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8) {
+        let mut all = [15; 4];
+        for (own, &count) in all.iter_mut().zip(counts) {
+            *own = u32::from(count);
+        }
+        let [a, b, c, d] = all;
+        let head = Self {
+            nodes: nodes & Self::PLACE | a << 28,
+            units: units & Self::PLACE | b << 28,
+        };
+        (head, (c | d << 4) as u8)
+    }
+
+    #[inline(always)]
+    fn children(&self, more: u8) -> usize {
+        let counts = self.counts(more);
+        let none = counts & counts >> 1 & counts >> 2 & counts >> 3 & 0x1111;
+        (none | 1 << 16).trailing_zeros() as usize / 4
+    }
+
+    #[inline(always)]
+    fn link<N>(&self, more: u8, lane: usize) -> Link {
+        let (lane, counts) = (lane as u32 % 4, self.counts(more));
+        let count = counts >> (4 * lane) & 15;
+        if count == 0 {
+            return Link::node::<N>((self.nodes & Self::PLACE) + lane);
+        }
+        let before = counts & ((1 << (4 * lane)) - 1);
+        let pairs = (before & 0x0f0f) + (before >> 4 & 0x0f0f);
+        let start = (pairs + (pairs >> 8)) & 0xff;
+        leaf(self.units & Self::PLACE, start, start + count)
+    }
+}
+
+/// The leaf of the primitives from `start` to `end` after the first of a node's.
+#[inline(always)]
+fn leaf(first: u32, start: u32, end: u32) -> Link {
+    Link::leaf_at(run::place(
+        first.wrapping_add(start),
+        end.wrapping_sub(start),
+    ))
+}
+
+impl<const W: usize, H: Head> CompactNode<W, H> {
+    fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
+        let (mut aabbs, mut counts, mut len) = ([Aabb::EMPTY; W], [0; W], 0);
+        let (mut nodes, mut units) = (None, None);
+        for (aabb, child) in children.into_iter().take(W) {
+            aabbs[len] = aabb;
+            match child.kind() {
+                ChildKind::Empty => break,
+                ChildKind::Node(place) => _ = nodes.get_or_insert(place as u32),
+                ChildKind::Leaf(place) => {
+                    let run = run::of_place(place);
+                    counts[len] = run.len() as u8;
+                    units.get_or_insert(run.start as u32);
+                }
+            }
+            len += 1;
+        }
+        let (mut frame, planes) = Frame::new(&aabbs[..len]);
+        let (head, more) = H::new(nodes.unwrap_or(0), units.unwrap_or(0), &counts[..len]);
+        frame.more = more;
+        Self {
+            frame,
+            head,
+            planes,
+        }
+    }
+
+    /// How many lanes have a child.
+    #[inline(always)]
+    fn lanes(&self) -> usize {
+        self.head.children(self.frame.more).min(W)
+    }
+
+    #[inline]
+    fn aabb(&self, lane: usize) -> Aabb {
+        if lane >= self.lanes() {
+            return Aabb::EMPTY;
+        }
+        let plane = |side: usize| {
+            Vec3::from_array(
+                [0, 1, 2].map(|axis| self.frame.plane(axis, self.planes[axis][side][lane])),
+            )
+        };
+        Aabb::new(plane(0), plane(1))
+    }
+
+    #[inline(always)]
+    fn lane_planes(&self, lane: usize, first: FirstPlanes<W>) -> [[f32; 3]; 2] {
+        let [[ax, ay, az], [bx, by, bz]] = first.pick(&self.planes);
+        let lane = lane % W;
+        let at = |axis, numbers: &[u8; W]| self.frame.plane(axis, numbers[lane]);
+        [
+            [at(0, ax), at(1, ay), at(2, az)],
+            [at(0, bx), at(1, by), at(2, bz)],
+        ]
+    }
+
+    #[inline(always)]
+    fn planes<V: Vector<W>>(&self, token: V::Token, first: FirstPlanes<W>) -> [[V; 3]; 2] {
+        let [[ax, ay, az], [bx, by, bz]] = first.pick(&self.planes);
+        [
+            [
+                self.axis_planes(token, 0, ax),
+                self.axis_planes(token, 1, ay),
+                self.axis_planes(token, 2, az),
+            ],
+            [
+                self.axis_planes(token, 0, bx),
+                self.axis_planes(token, 1, by),
+                self.axis_planes(token, 2, bz),
+            ],
+        ]
+    }
+
+    #[inline(always)]
+    fn axis_planes<V: Vector<W>>(&self, token: V::Token, axis: usize, numbers: &[u8; W]) -> V {
+        let step = V::splat(token, self.frame.step(axis));
+        let origin = V::splat(token, self.frame.origin[axis]);
+        V::of_bytes(token, numbers).mul_add(step, origin)
+    }
+
+    #[inline(always)]
+    fn present<V: Vector<W>>(&self, token: V::Token, hit: V) -> V {
+        hit & V::of_bits(token, (1 << self.lanes()) - 1)
+    }
+
+    /// # Safety
+    /// There is such a lane.
+    #[inline(always)]
+    unsafe fn link(&self, lane: usize) -> Link {
+        self.head.link::<Self>(self.frame.more, lane)
+    }
+
+    #[inline(always)]
+    fn link_lanes<V: Vector<W>>(&self, token: V::Token) -> V {
+        let mut links = [0.0; W];
+        for (lane, link) in links.iter_mut().enumerate() {
+            *link = f32::from_bits(self.head.link::<Self>(self.frame.more, lane).to_bits());
+        }
+        V::load(token, &links)
+    }
+}

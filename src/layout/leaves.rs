@@ -1,0 +1,144 @@
+//! How a hierarchy keeps its leaves, and what the traversal needs of those that hold triangles.
+
+use super::{LayoutError, Leaf, Storage};
+use crate::{
+    primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
+    simd::{Lanes, Simd},
+};
+use core::ops::Range;
+
+/// A kind of leaves: stored one by one ([`Leaf`]), or as runs of the list of primitive numbers alone
+/// ([`RunLeaf`](super::RunLeaf), [`MeshLeaf`](super::MeshLeaf)).
+pub trait Leaves: Sized {
+    /// All leaves of a hierarchy, in memory of `S`.
+    type Store<S: Storage>: Clone;
+    /// One of them.
+    #[doc(hidden)]
+    type Ref<'a>: Copy;
+
+    /// Which of what is counted a leaf at `place` takes up: leaves, or primitive numbers.
+    #[doc(hidden)]
+    fn span(place: usize) -> Range<usize>;
+    /// The place of the only leaf of a hierarchy, over `count` of what is counted, if that is one leaf.
+    #[doc(hidden)]
+    fn only(count: usize) -> Option<u32>;
+    /// How many there are of what is counted.
+    ///
+    /// # Errors
+    /// More than places tell apart; or the first leaf that cannot be walked.
+    #[doc(hidden)]
+    fn count<S: Storage>(store: &Self::Store<S>, primitives: &[u32]) -> Result<usize, LayoutError>;
+    /// One more than the greatest primitive number, if what has the numbers is not checked by itself.
+    #[doc(hidden)]
+    fn numbers(_primitives: &[u32]) -> u64 {
+        0
+    }
+    /// The leaf at a place.
+    ///
+    /// # Safety
+    /// The layout's check saw that it is there.
+    #[doc(hidden)]
+    unsafe fn at<'a, S: Storage>(
+        store: &'a Self::Store<S>,
+        primitives: &'a [u32],
+        place: usize,
+    ) -> Self::Ref<'a>;
+    /// What is read first of the leaf at a place, to be fetched.
+    #[doc(hidden)]
+    fn address<S: Storage>(store: &Self::Store<S>, primitives: &[u32], place: usize) -> *const u8;
+    /// How many primitives a leaf has.
+    #[doc(hidden)]
+    fn primitives(leaf: Self::Ref<'_>) -> usize;
+}
+
+impl<L: Leaf> Leaves for L {
+    type Store<S: Storage> = S::Slice<L>;
+    type Ref<'a> = &'a L;
+
+    #[inline(always)]
+    fn span(place: usize) -> Range<usize> {
+        place..place + 1
+    }
+
+    fn only(count: usize) -> Option<u32> {
+        (count == 1).then_some(0)
+    }
+
+    fn count<S: Storage>(store: &S::Slice<L>, primitives: &[u32]) -> Result<usize, LayoutError> {
+        if store.len() > (1 << 31) - 2 {
+            return Err(LayoutError::TooLarge);
+        }
+        for (index, leaf) in store.iter().enumerate() {
+            if !leaf.is_sound() || leaf.primitives().end > primitives.len() as u64 {
+                return Err(LayoutError::Leaf(index));
+            }
+        }
+        Ok(store.len())
+    }
+
+    #[inline(always)]
+    unsafe fn at<'a, S: Storage>(store: &'a S::Slice<L>, _: &'a [u32], place: usize) -> &'a L {
+        // SAFETY: the caller's promise.
+        unsafe { store.get_unchecked(place) }
+    }
+
+    #[inline(always)]
+    fn address<S: Storage>(store: &S::Slice<L>, _: &[u32], place: usize) -> *const u8 {
+        store.as_ptr().wrapping_add(place).cast()
+    }
+
+    fn primitives(leaf: &L) -> usize {
+        let Range { start, end } = leaf.primitives();
+        (end - start) as usize
+    }
+}
+
+/// Up to 8 triangles: what the one triangle test needs of a leaf.
+#[doc(hidden)]
+pub trait Triangles: Copy {
+    /// Where their numbers begin in the hierarchy's list.
+    fn first(self) -> usize;
+    /// How many there are.
+    fn count(self) -> usize;
+    /// Their corners as the ray sees them. What stands in lanes past the last triangle is finite if they all are.
+    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8>;
+
+    /// A bit for each triangle there is.
+    #[inline(always)]
+    fn lanes(self) -> u32 {
+        (1 << self.count()) - 1
+    }
+
+    /// Their corners as the ray sees them, and which of them the ray may hit: what the rest of the test works on.
+    #[inline(always)]
+    fn edges<T: Simd>(
+        self,
+        token: T,
+        ray: &RayShear<'_, T::F32x8>,
+    ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
+        let corners = self.corners(token, ray);
+        let edges = ray.along(token).edges::<8>(token, corners, self.lanes());
+        (corners, edges)
+    }
+
+    /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit.
+    #[inline(always)]
+    fn test<T: Simd, const NEED_T: bool>(
+        self,
+        token: T,
+        ray: &RayShear<'_, T::F32x8>,
+        t_max: f32,
+    ) -> Option<TriangleHits<T::F32x8>> {
+        let (corners, edges) = self.edges(token, ray);
+        if edges.candidates == 0 {
+            return None;
+        }
+        let t_max = T::F32x8::splat(token, t_max);
+        ray.along(token)
+            .test::<8, NEED_T>(token, corners, edges, t_max)
+    }
+}
+
+/// Leaves of triangles.
+pub trait TriangleLeaves: for<'a> Leaves<Ref<'a>: Triangles> {}
+impl<L: for<'a> Leaves<Ref<'a>: Triangles>> TriangleLeaves for L {}

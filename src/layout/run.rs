@@ -1,0 +1,186 @@
+//! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
+
+use super::{Borrowed, Bvh, LayoutError, Leaves, Storage, Triangles, WideNode};
+use crate::{
+    geometry::TriangleMesh,
+    primitive::triangle::{Corners, RayShear},
+    simd::{Lanes, Simd},
+};
+use core::{error::Error, fmt, ops::Range};
+
+/// The most primitives of a run.
+pub(crate) const MAX_RUN: usize = 8;
+/// How many bits of a place say where a run begins; those above say how long it is, less 1.
+const FIRST_BITS: u32 = 28;
+const FIRST: u32 = (1 << FIRST_BITS) - 1;
+
+/// The place, as links have it, of `count` primitives from number `first` of the list on, 1 to 8 in number.
+#[inline(always)]
+pub(crate) const fn place(first: u32, count: u32) -> u32 {
+    first & FIRST | (count.wrapping_sub(1) & 7) << FIRST_BITS
+}
+
+/// The run at a place.
+#[inline(always)]
+pub(crate) const fn of_place(place: usize) -> Range<usize> {
+    let first = place & FIRST as usize;
+    first..first + (place >> FIRST_BITS & 7) + 1
+}
+
+/// Leaves of up to 8 primitives, which are read from an `M`.
+#[derive(Clone, Copy, Debug)]
+pub struct Runs<M>(M);
+
+/// Leaves of up to 8 primitives, of which the hierarchy knows the numbers alone. What they are each query is told
+/// ([`Primitives`](crate::primitive::Primitives)); or, of triangles, the hierarchy is: [`Bvh::over`].
+pub type RunLeaf = Runs<()>;
+/// Leaves of up to 8 triangles of a mesh, which are read where the mesh has them.
+pub type MeshLeaf<'m> = Runs<TriangleMesh<'m>>;
+
+/// A leaf of a run.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub struct Run<'a, M> {
+    of: M,
+    primitives: &'a [u32],
+    place: u32,
+}
+
+impl<M: Copy> Leaves for Runs<M> {
+    type Store<S: Storage> = M;
+    type Ref<'a> = Run<'a, M>;
+
+    #[inline(always)]
+    fn span(place: usize) -> Range<usize> {
+        of_place(place)
+    }
+
+    fn only(count: usize) -> Option<u32> {
+        (1..=MAX_RUN)
+            .contains(&count)
+            .then(|| place(0, count as u32))
+    }
+
+    fn count<S: Storage>(_: &M, primitives: &[u32]) -> Result<usize, LayoutError> {
+        match primitives.len() {
+            count if count < FIRST as usize => Ok(count),
+            _ => Err(LayoutError::TooLarge),
+        }
+    }
+
+    fn numbers(primitives: &[u32]) -> u64 {
+        let greatest = primitives.iter().max();
+        greatest.map_or(0, |&number| u64::from(number) + 1)
+    }
+
+    #[inline(always)]
+    unsafe fn at<'a, S: Storage>(of: &'a M, primitives: &'a [u32], place: usize) -> Run<'a, M> {
+        Run {
+            of: *of,
+            primitives,
+            place: place as u32,
+        }
+    }
+
+    #[inline(always)]
+    fn address<S: Storage>(_: &M, primitives: &[u32], place: usize) -> *const u8 {
+        let first = place & FIRST as usize;
+        primitives.as_ptr().wrapping_add(first).cast()
+    }
+
+    #[inline(always)]
+    fn primitives(leaf: Run<M>) -> usize {
+        leaf.range().len()
+    }
+}
+
+impl<M> Run<'_, M> {
+    /// Its places in the list.
+    #[inline(always)]
+    pub(crate) fn range(&self) -> Range<usize> {
+        of_place(self.place as usize)
+    }
+}
+
+impl Triangles for Run<'_, TriangleMesh<'_>> {
+    #[inline(always)]
+    fn first(self) -> usize {
+        self.range().start
+    }
+
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.range().len()
+    }
+
+    #[inline(always)]
+    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
+        let (indices, positions) = (self.of.indices(), self.of.positions());
+        let Range { start, end } = self.range();
+        let mut triangles = [&[0; 3]; MAX_RUN];
+        for (lane, triangle) in triangles.iter_mut().enumerate() {
+            // SAFETY: the layout's check saw that the run is within the list, and `over`, that every number of the list
+            // is within the mesh.
+            *triangle = unsafe {
+                let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
+                indices.get_unchecked(number as usize)
+            };
+        }
+        let mut corners = [[<T::F32x8 as Lanes>::splat(token, 0.0); 3]; 3];
+        for corner in 0..3 {
+            let mut vertices = [&[0.0; 3]; MAX_RUN];
+            for (vertex, triangle) in vertices.iter_mut().zip(triangles) {
+                // SAFETY: a mesh's indices are within its positions.
+                *vertex = unsafe { positions.get_unchecked(triangle[corner] as usize) };
+            }
+            let sheared = ray.shear(token, token.coordinates(vertices));
+            corners[0][corner] = sheared.x;
+            corners[1][corner] = sheared.y;
+            corners[2][corner] = sheared.z;
+        }
+        corners
+    }
+}
+
+impl<N: WideNode, S: Storage> Bvh<N, RunLeaf, S> {
+    /// The hierarchy over the triangles of `mesh`, which is the one that it was built on.
+    ///
+    /// Of another mesh, queries find what they find: some of its triangles, no more.
+    ///
+    /// # Errors
+    /// The mesh has no triangle of some number that is in a leaf.
+    pub fn over<'a>(
+        &'a self,
+        mesh: &TriangleMesh<'a>,
+    ) -> Result<Bvh<N, MeshLeaf<'a>, Borrowed<'a>>, MeshTooSmall> {
+        if self.numbers > mesh.len() as u64 {
+            return Err(MeshTooSmall {
+                triangles: mesh.len(),
+                needed: self.numbers,
+            });
+        }
+        Ok(self.with_leaves(*mesh))
+    }
+}
+
+/// A mesh has fewer triangles than a hierarchy that was to be put over it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshTooSmall {
+    /// How many triangles the mesh has.
+    pub triangles: usize,
+    /// How many it must have at least.
+    pub needed: u64,
+}
+
+impl fmt::Display for MeshTooSmall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { triangles, needed } = self;
+        write!(
+            f,
+            "a mesh of {triangles} triangles where leaves have numbers up to {}",
+            needed - 1
+        )
+    }
+}
+
+impl Error for MeshTooSmall {}
