@@ -4,8 +4,10 @@
 //! last two. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
 
 mod batch;
+mod boxes;
 mod bundle;
 mod count;
+mod one_by_one;
 mod primitives;
 mod query;
 mod single;
