@@ -98,6 +98,12 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         &self.nodes
     }
 
+    /// How the leaves are kept.
+    #[cfg(feature = "alloc")]
+    pub(super) fn leaf_store(&self) -> &L::Store<S> {
+        &self.leaves
+    }
+
     /// What is read first of the leaf at a place.
     #[inline(always)]
     pub(crate) fn leaf_address(&self, place: usize) -> *const u8 {
@@ -144,7 +150,6 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     }
 
     /// Notes that the builder left out this many primitives.
-    #[cfg(feature = "std")]
     pub(crate) fn with_dropped(self, dropped: u32) -> Self {
         Self { dropped, ..self }
     }
