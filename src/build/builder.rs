@@ -210,7 +210,7 @@ impl<'m> Builder<'m> {
     ///
     /// # Errors
     /// As [`build`](Self::build); the first place of the tree's order with a triangle that is not in the mesh, or the
-    /// first triangle that is in no leaf.
+    /// first triangle that is in no leaf and would not be left out.
     pub fn build_from_tree(
         &self,
         mesh: &TriangleMesh,

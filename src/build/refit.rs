@@ -37,7 +37,7 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
         let primitives = self.primitives();
         let moved = |leaf: &TriangleLeaf| move_leaf(mesh, leaf, &primitives[places(leaf)]);
         let leaves = map_all(self.leaves(), moved)?;
-        none_is_missing(&Triangles(mesh), primitives)?;
+        none_is_missing(&Triangles(mesh), self.leaves(), primitives)?;
         let (leaves, boxes) = leaves.into_iter().unzip();
         self.update(leaves, boxes);
         Ok(())
@@ -71,7 +71,7 @@ impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
             Ok((*leaf, aabb))
         };
         let leaves = map_all(self.leaves(), moved)?;
-        none_is_missing(&input, primitives)?;
+        none_is_missing(&input, self.leaves(), primitives)?;
         let (leaves, mut boxes): (_, Vec<Aabb>) = leaves.into_iter().unzip();
         // A leaf of nothing is still a leaf, and has a place.
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, &aabb| all.join(aabb));
@@ -158,10 +158,14 @@ fn map_all<L: Leaf + Sync + Send>(
     })
 }
 
-/// What is in no leaf cannot be hit.
-fn none_is_missing<I: Input>(input: &I, primitives: &[u32]) -> Result<(), RefitError> {
+/// What is in no leaf cannot be hit. Parts that were put together may list what is in none.
+fn none_is_missing<I: Input>(
+    input: &I,
+    leaves: &[I::Leaf],
+    primitives: &[u32],
+) -> Result<(), RefitError> {
     let mut listed = vec![0u64; input.len().div_ceil(64)];
-    for &id in primitives {
+    for &id in leaves.iter().flat_map(|leaf| &primitives[places(leaf)]) {
         if let Some(word) = listed.get_mut(id as usize / 64) {
             *word |= 1 << (id % 64);
         }
