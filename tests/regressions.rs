@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::Variants;
+use common::{Variants, part};
 use glam::Vec3;
 use wide_bvh::geometry::{Hit, Ray};
 use wide_bvh_scenes::shapes;
@@ -44,7 +44,7 @@ fn embree_181_174_rays_at_a_vertex() {
     let scene = Variants::new(positions, indices);
     let vertex = Vec3::new(0.3, 0.2, 0.1);
     let mut random = fastrand::Rng::with_seed(common::SEED);
-    for _ in 0..5_000 {
+    for _ in 0..part(5_000) {
         let away = Vec3::new(random.f32() - 0.5, random.f32() - 0.5, 0.6 + random.f32());
         let origin = vertex + away * 10f32.powf(random.f32() * 6.0 - 3.0);
         let hit = hit(&scene, Ray::new(origin, vertex - origin)).expect("a hit at the vertex");
@@ -58,7 +58,7 @@ fn embree_181_174_rays_at_a_vertex() {
 fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
     let mut random = fastrand::Rng::with_seed(common::SEED);
     let mut hits = 0;
-    for _ in 0..20_000 {
+    for _ in 0..part(20_000) {
         // Edges of 11.2, 9.7 and about 1.4; the plane holds the x axis, or nearly.
         let tilt = (random.f32() - 0.5) * 0.5f32.to_radians() * 2.0;
         let turn = random.f32() * std::f32::consts::TAU;
@@ -76,7 +76,7 @@ fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
             assert!((585.0..615.0).contains(&hit.t), "{hit:?} on {corners:?}");
         }
     }
-    assert!(hits > 10_000, "only {hits} hits");
+    assert!(hits > part(10_000), "only {hits} hits");
 }
 
 /// Embree #423: SSE2, SSE4.2 and AVX report a hit that AVX2 does not. Rays that graze edges, on every
@@ -87,7 +87,7 @@ fn embree_423_backends_agree_at_edges() {
     let corners = scene.mesh().triangle(0).unwrap();
     let mut random = fastrand::Rng::with_seed(common::SEED);
     let mut hits = 0;
-    for _ in 0..20_000 {
+    for _ in 0..part(20_000) {
         let i = random.usize(..3);
         let edge = corners[i].lerp(corners[(i + 1) % 3], random.f32());
         let origin = Vec3::new(random.f32(), random.f32(), -random.f32());
@@ -95,8 +95,9 @@ fn embree_423_backends_agree_at_edges() {
         hits += usize::from(hit(&scene, Ray::new(origin, edge + nudge - origin)).is_some());
     }
     assert!(
-        (5_000..15_000).contains(&hits),
-        "{hits} of 20000 at an edge"
+        (part(5_000)..part(15_000)).contains(&hits),
+        "{hits} of {} at an edge",
+        part(20_000)
     );
 }
 
@@ -105,7 +106,7 @@ fn embree_423_backends_agree_at_edges() {
 fn embree_416_no_phantoms_between_large_and_small() {
     let scene = one_triangle([[0.0, 0.0, 0.0], [60_000.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
     let mut random = fastrand::Rng::with_seed(common::SEED);
-    for _ in 0..20_000 {
+    for _ in 0..part(20_000) {
         let x = random.f32() * 60_000.0;
         // The triangle lies between the lines y = x / 60000 and y = 1; aim well outside.
         let gap = 0.01 + random.f32();
@@ -221,7 +222,7 @@ fn tinybvh_138_few_triangles() {
 fn parry_444_no_holes_in_a_picture() {
     let mesh = shapes::icosphere(4);
     let scene = Variants::new(mesh.positions, mesh.indices);
-    let size = 128;
+    let size = part(128).max(32) as i32;
     for y in 0..size {
         for x in 0..size {
             let pixel = |i: i32| (i as f32 + 0.5) / size as f32 * 2.4 - 1.2;
@@ -309,7 +310,7 @@ fn bvh_44_degenerate_triangles() {
     ];
     let scene = Variants::new(positions, degenerate);
     let mut random = fastrand::Rng::with_seed(common::SEED);
-    for _ in 0..5_000 {
+    for _ in 0..part(5_000) {
         let origin = Vec3::from([0; 3].map(|_| random.f32() * 4.0 - 2.0));
         let target = Vec3::X * (random.f32() * 2.0);
         assert_eq!(hit(&scene, Ray::new(origin, target - origin)), None);

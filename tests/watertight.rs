@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{SEED, Variants};
+use common::{SEED, Variants, part};
 use glam::Vec3;
 use wide_bvh::geometry::Ray;
 use wide_bvh_scenes::{Mesh, shapes};
@@ -15,7 +15,7 @@ fn no_ray_gets_out(mesh: Mesh, centre: Vec3, inner_radius: f32, rays: usize) {
     let scene = Variants::new(mesh.positions.clone(), mesh.indices.clone());
     let vertices: Vec<Vec3> = mesh.positions.iter().map(|&p| p.into()).collect();
     let mut checked = 0;
-    for i in 0..rays {
+    for i in 0..part(rays) {
         let offset = Vec3::from([0; 3].map(|_| random.f32() - 0.5)) * inner_radius;
         // Every other ray from the exact centre, where symmetric meshes line up.
         let origin = if i % 2 == 0 { centre } else { centre + offset };

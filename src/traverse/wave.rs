@@ -273,9 +273,10 @@ impl Lane {
         }
         self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);
 
-        // Not by a branch, nor anything that may become one.
-        let node = nodes as usize + self.current.node_offset();
-        let leaf = leaves as usize + self.current.leaf() * size_of::<TriangleLeaf>();
+        // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
+        // 32 bits hold.
+        let node = nodes.wrapping_byte_add(self.current.node_offset()) as usize;
+        let leaf = leaves.wrapping_add(self.current.leaf()) as usize;
         let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
         token.prefetch((node ^ ((node ^ leaf) & is_leaf)) as *const u8);
     }

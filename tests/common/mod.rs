@@ -19,10 +19,17 @@ use wide_bvh::{
 /// The seed of every random test, so that a failure is there again the next time.
 pub const SEED: u64 = 0x5eed_0b0e;
 
-/// `cases` cases from the fixed seed.
+/// `count`, or the part of it that is asked for: `TEST_PART=20` is a twentieth of all random tests, for processors that
+/// are emulated.
+pub fn part(count: usize) -> usize {
+    let part = std::env::var("TEST_PART").map(|part| part.parse());
+    count.div_ceil(part.map_or(1, |part| part.expect("TEST_PART: a number, 1 or more")))
+}
+
+/// `cases` cases, or the [`part`] of them, from the fixed seed.
 pub fn config(cases: u32) -> Config {
     Config {
-        cases,
+        cases: part(cases as usize) as u32,
         rng_seed: RngSeed::Fixed(SEED),
         failure_persistence: None,
         ..Config::default()
