@@ -71,11 +71,7 @@ pub(super) fn check<N: WideNode, L: Leaf>(
     primitives: &[u32],
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
-    let most = (1 << 31) - 2;
-    let most_nodes = most / (size_of::<N>() / Link::UNIT);
-    if nodes.len() > most_nodes || leaves.len() > most || primitives.len() > u32::MAX as usize {
-        return Err(LayoutError::TooLarge);
-    }
+    let root = root::<N>(nodes.len(), leaves.len(), primitives.len())?;
     for (index, leaf) in leaves.iter().enumerate() {
         if !leaf.is_sound() || leaf.primitives().end > primitives.len() as u64 {
             return Err(LayoutError::Leaf(index));
@@ -122,7 +118,21 @@ pub(super) fn check<N: WideNode, L: Leaf>(
     if next_leaf < leaves.len() {
         return Err(LayoutError::UnusedLeaves(next_leaf));
     }
-    Ok(match (nodes.len(), leaves.len()) {
+    Ok(root)
+}
+
+/// Where a walk over so many nodes, leaves and primitives begins, if their numbers can tell them apart.
+pub(super) fn root<N: WideNode>(
+    nodes: usize,
+    leaves: usize,
+    primitives: usize,
+) -> Result<Child, LayoutError> {
+    let most = (1 << 31) - 2;
+    let most_nodes = most / (size_of::<N>() / Link::UNIT);
+    if nodes > most_nodes || leaves > most || primitives > u32::MAX as usize {
+        return Err(LayoutError::TooLarge);
+    }
+    Ok(match (nodes, leaves) {
         (0, 0) => Child::EMPTY,
         (0, _) => Child::leaf(0),
         _ => Child::node(0),
