@@ -8,7 +8,9 @@ use super::{
 use crate::{
     geometry::{Aabb, TriangleMesh},
     layout::{Bvh, ChildKind, Leaf, Owned, PrimitiveLeaf, TriangleLeaf, WideNode},
+    simd::{Backend, Operation, Simd},
 };
+use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
 use std::{vec, vec::Vec};
@@ -63,7 +65,7 @@ impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
             let ids = &primitives[places(leaf)];
             let aabb = ids.iter().try_fold(Aabb::EMPTY, |aabb, &id| {
                 match in_range(id, aabbs.len()).map(|id| input.verdict(id))? {
-                    Verdict::Keep(own) => Ok(aabb.join(own)),
+                    Verdict::Keep(own) => Ok(aabb.join(own.aabb())),
                     Verdict::Unhittable => Ok(aabb),
                     Verdict::NonFinite(error) | Verdict::Invalid(error) => Err(at(id, error)),
                 }
@@ -198,8 +200,8 @@ fn move_leaf(
     for (triangle, &id) in ids.iter().enumerate() {
         let id = in_range(id, mesh.len())?;
         match triangles.verdict(id) {
-            Verdict::Keep(aabb) => {
-                bounds = bounds.join(aabb);
+            Verdict::Keep(own) => {
+                bounds = bounds.join(own.aabb());
                 have_area |= 1 << triangle;
             }
             // Its box keeps the leaf's from being none.
@@ -215,21 +217,48 @@ fn move_leaf(
     };
     let leaf = match moved {
         Some(vertices) => TriangleLeaf::from_lanes(vertices, leaf.corners, first, ids.len()),
-        None => {
-            let mut filling = Filling::EMPTY;
-            for (triangle, &id) in ids.iter().enumerate() {
-                let corners = Corners::new(mesh, id);
-                if have_area & 1 << triangle == 0 {
-                    filling.add_none(&corners);
-                } else if !filling.add(&corners) {
-                    let primitive = id as usize;
-                    return Err(RefitError::VerticesParted { primitive });
-                }
-            }
-            filling.leaf(first).unwrap_or(*leaf)
-        }
+        None => Backend::detect().run(Refill {
+            mesh,
+            ids,
+            have_area,
+            first,
+        })?,
     };
     Ok((leaf, bounds))
+}
+
+/// A leaf filled anew.
+struct Refill<'a> {
+    mesh: &'a TriangleMesh<'a>,
+    /// Some.
+    ids: &'a [u32],
+    have_area: u32,
+    first: u32,
+}
+
+impl Operation for Refill<'_> {
+    type Output = Result<TriangleLeaf, RefitError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) -> Self::Output {
+        let mut filling: Option<Filling<S>> = None;
+        for (triangle, &id) in self.ids.iter().enumerate() {
+            let corners = Corners::new(self.mesh, id);
+            let has_area = self.have_area & 1 << triangle != 0;
+            match &mut filling {
+                None if has_area => filling = Some(Filling::of(token, &corners)),
+                None => filling = Some(Filling::of_none(token, &corners)),
+                Some(filling) if !has_area => filling.add_none(),
+                Some(filling) => {
+                    if !filling.add(token, &corners) {
+                        let primitive = id as usize;
+                        return Err(RefitError::VerticesParted { primitive });
+                    }
+                }
+            }
+        }
+        Ok(filling.map_or(TriangleLeaf::zeroed(), |filling| filling.leaf(self.first)))
+    }
 }
 
 /// The vertices, if the lanes that triangles have for corners are still right: all corners that share one are at one
