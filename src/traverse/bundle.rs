@@ -244,12 +244,11 @@ impl<'a, T: Simd> Bundle<'a, T> {
     fn passing(&mut self, token: T, near: [f32; 3], far: [f32; 3], rays: u64) -> u64 {
         let (near, far) = (splat3(token, near), splat3(token, far));
         let mut passing = 0;
-        for index in 0..self.count {
-            if (rays >> (LANES * index)) as u8 != 0 {
-                let packet = self.packet(index);
-                let (hit, _) = packet.slabs.between(near, far, packet.far);
-                passing |= u64::from(hit.bits()) << (LANES * index);
-            }
+        let mut left = rays;
+        while let Some(index) = first_packet(&mut left) {
+            let packet = self.packet(index);
+            let (hit, _) = packet.slabs.between(near, far, packet.far);
+            passing |= u64::from(hit.bits()) << (LANES * index);
         }
         passing & rays
     }
@@ -264,11 +263,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
         rays: u64,
     ) {
         let mut closer = 0;
-        for index in 0..self.count {
+        let mut left = rays;
+        while let Some(index) = first_packet(&mut left) {
             let lanes = u32::from((rays >> (LANES * index)) as u8);
-            if lanes == 0 {
-                continue;
-            }
             let found = u32::from((self.found >> (LANES * index)) as u8);
             let (axes, of_packet) = (self.axes, &self.rays[LANES * index..]);
             let packet = self.packet(index);
@@ -450,6 +447,17 @@ impl<T: Simd> Packet<T> {
         }
         new
     }
+}
+
+/// The first packet that has any of the rays. Takes its rays from them.
+#[inline(always)]
+fn first_packet(rays: &mut u64) -> Option<usize> {
+    if *rays == 0 {
+        return None;
+    }
+    let index = rays.trailing_zeros() as usize / LANES;
+    *rays &= !(0xff << (LANES * index));
+    Some(index)
 }
 
 /// Puts an entry where it belongs among those from `base` to `len`, of which the nearest is the last.
