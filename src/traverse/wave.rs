@@ -21,6 +21,9 @@ use crate::{
 };
 use core::{hint::select_unpredictable, mem::MaybeUninit};
 
+/// The most runs of 64 rays of a wave.
+pub(super) const GROUPS: usize = 256;
+
 /// The most lanes of a wave.
 const MOST_LANES: usize = 64;
 
@@ -59,8 +62,11 @@ struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
     scene: SceneExtent,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    /// The next ray to start.
-    next: usize,
+    /// For each run of 64 rays a bit for each to be traced.
+    waiting: &'a [u64; GROUPS],
+    /// The run that is being started, and those of it that are left.
+    group: usize,
+    left: u64,
     lanes: &'a mut [MaybeUninit<Lane>; LANES],
     at_node: List,
     at_leaf: List,
@@ -72,13 +78,15 @@ struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
 /// What a first look at a leaf has brought.
 type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
 
-/// Traces all `rays`, of which there are as many as `answers`.
+/// Traces those `rays` that `waiting` has a bit for, the first 64 in its first number and so on. There are as many as
+/// `answers`. Bits past the last ray are passed over.
 #[inline(always)]
 pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usize>(
     token: T,
     bvh: &Bvh<N, TriangleLeaf, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
+    waiting: &[u64; GROUPS],
     lanes: &mut [MaybeUninit<Lane>; LANES],
 ) {
     const { assert!(0 < LANES && LANES <= MOST_LANES) };
@@ -91,7 +99,9 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usi
         scene: SceneExtent::new(bvh.bounds()),
         rays,
         answers,
-        next: 0,
+        waiting,
+        group: 0,
+        left: waiting[0],
         lanes,
         at_node: List::EMPTY,
         at_leaf: List::EMPTY,
@@ -168,12 +178,25 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
         self.at_end.push_if(lane, go & end);
     }
 
+    /// The number of the next ray to start.
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        while self.left == 0 {
+            self.group += 1;
+            self.left = *self.waiting.get(self.group)?;
+        }
+        let place = self.left.trailing_zeros() as usize;
+        self.left &= self.left - 1;
+        Some(64 * self.group + place)
+    }
+
     /// Starts the next ray that may hit something, if there is one.
     #[inline(always)]
     fn start<T: Simd>(&mut self, token: T, lane: usize) {
-        while let Some(ray) = self.rays.get(self.next) {
-            let index = self.next;
-            self.next += 1;
+        while let Some(index) = self.next() {
+            let Some(ray) = self.rays.get(index) else {
+                return;
+            };
             let mut room = PreparedRay::ROOM;
             let Some(prepared) = PreparedRay::new(ray, &mut room) else {
                 if let Some(answer) = self.answers.get_mut(index) {
