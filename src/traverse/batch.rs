@@ -236,7 +236,8 @@ impl<N: WideNode, S: Storage, Q: Query, const RAYS: usize> Operation for Packet<
             }
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
-        if !bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]) {
+        let outcome = bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]);
+        if outcome == bundle::Outcome::Unlike {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = (self.one)(self.bvh, ray);
             }

@@ -3,7 +3,10 @@
 //! Those of a bundle have to agree on them. Where a tile of a picture, or of points that look towards a light, straddles a
 //! border between two classes, its rays make a bundle each class.
 
-use super::{bundle, query::Query};
+use super::{
+    bundle::{self, Outcome},
+    query::Query,
+};
 use crate::{
     geometry::Ray,
     layout::{Bvh, Storage, TriangleLeaf, WideNode},
@@ -17,14 +20,23 @@ const LEAST: u32 = 8;
 /// For every ray a bit each: the signs of its direction, and whether x, or y, is its largest component.
 struct Classes([u64; 5]);
 
-/// For how many runs of rays classes are not asked for, since they were of no use.
+/// What batches do not try for a while, since it was of no use.
 #[derive(Default)]
 pub(super) struct Patience {
+    /// Bundles.
+    loose: Pause,
+    /// Classes.
+    unlike: Pause,
+}
+
+/// For how many runs of rays something is not tried: the more, the more often it was of no use.
+#[derive(Default)]
+struct Pause {
     left: u32,
     next: u32,
 }
 
-impl Patience {
+impl Pause {
     const MOST: u32 = 31;
 
     #[inline(always)]
@@ -34,10 +46,10 @@ impl Patience {
         out
     }
 
-    /// Whether there were rays alike in a class.
+    /// Takes note of whether it was of use.
     #[inline(always)]
-    fn note(&mut self, any_alike: bool) {
-        self.next = if any_alike {
+    fn note(&mut self, of_use: bool) {
+        self.next = if of_use {
             0
         } else {
             (2 * self.next + 1).min(Self::MOST)
@@ -60,6 +72,9 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
         return 0;
     }
     let all = u64::MAX >> (bundle::RAYS - rays.len().min(bundle::RAYS));
+    if patience.loose.is_out() {
+        return all;
+    }
     let (mut class, mut classes) = (all, None);
     let (mut left, mut waiting) = (all, 0);
     let mut any_alike = false;
@@ -76,12 +91,14 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
             }
             (&gathered[..count], &mut found[..count])
         };
-        let alike = bundle::trace::<T, N, S, Q>(token, bvh, part, out);
+        let outcome = bundle::trace::<T, N, S, Q>(token, bvh, part, out);
+        let alike = outcome != Outcome::Unlike;
         if whole {
             if alike {
+                patience.loose.note(outcome == Outcome::Tight);
                 return 0;
             }
-            if patience.is_out() {
+            if patience.unlike.is_out() {
                 return all;
             }
             classes = Some(Classes::new(token, rays));
@@ -102,13 +119,13 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
                 return left | waiting;
             };
             if left.count_ones() < LEAST {
-                patience.note(any_alike);
+                patience.unlike.note(any_alike);
                 return left | waiting;
             }
             class = classes.of_first(left);
             if class == all {
                 // Not alike for another reason.
-                patience.note(false);
+                patience.unlike.note(false);
                 return all;
             }
             if class.count_ones() >= LEAST {
