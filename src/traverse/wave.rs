@@ -68,11 +68,6 @@ struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
     group: usize,
     left: u64,
     lanes: &'a mut [MaybeUninit<Lane>; LANES],
-    at_node: List,
-    at_leaf: List,
-    /// At a leaf with candidates.
-    at_triangles: List,
-    at_end: List,
 }
 
 /// What a first look at a leaf has brought.
@@ -103,61 +98,77 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usi
         group: 0,
         left: waiting[0],
         lanes,
-        at_node: List::EMPTY,
-        at_leaf: List::EMPTY,
-        at_triangles: List::EMPTY,
-        at_end: List::EMPTY,
     };
-    for lane in 0..LANES {
-        wave.start(token, lane);
-    }
     wave.run(token);
 }
 
 impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LANES> {
     #[inline(always)]
     fn run<T: Simd>(&mut self, token: T) {
+        // Lengths apart from what they are of, and both from all else, so that they stay in registers.
+        let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
+        let (mut nodes, mut rest) = (0, 0);
+        // What comes after nodes: leaves, those of them with candidates, and ends.
+        let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
         // Apart, so that lists are short and what they are of is together.
         let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
+        for lane in 0..LANES {
+            let started = self.start(token, lane);
+            let leaf = self.bvh.root().is_leaf();
+            at_node.push_if(&mut nodes, lane, started & !leaf);
+            at_rest.push_if(&mut rest, lane, started & leaf);
+        }
         loop {
             // Leaves wait for company until few rays are at nodes.
-            let few = self.at_node.len <= LANES / 4;
-            if !few || self.at_leaf.len + self.at_end.len == 0 {
-                if self.at_node.len == 0 {
+            if nodes > LANES / 4 || rest == 0 {
+                if nodes == 0 {
                     return;
                 }
-                for place in 0..self.at_node.take() {
-                    let (lane, bvh) = (self.at_node.get(place), self.bvh);
+                for place in 0..take(&mut nodes) {
+                    let (lane, bvh) = (at_node.get(place), self.bvh);
                     let state = self.lane(lane);
                     state.test_node::<T, N, S, Q>(token, bvh);
-                    let current = state.current;
-                    self.sort(lane, current, true);
+                    let leaf = state.current.is_leaf();
+                    at_node.push_if(&mut nodes, lane, !leaf);
+                    at_rest.push_if(&mut rest, lane, leaf);
                 }
                 continue;
             }
-            for place in 0..self.at_leaf.take() {
-                let (lane, bvh) = (self.at_leaf.get(place), self.bvh);
+            let (mut leaves, mut triangles, mut ends) = (0, 0, 0);
+            for place in 0..take(&mut rest) {
+                let lane = at_rest.get(place);
+                let end = self.lane(lane).current == BOTTOM;
+                at_leaf.push_if(&mut leaves, lane, !end);
+                at_end.push_if(&mut ends, lane, end);
+            }
+            for place in 0..leaves {
+                let (lane, bvh) = (at_leaf.get(place), self.bvh);
                 // SAFETY: no more lanes are in a list than there are.
-                let look = unsafe { looks.get_unchecked_mut(self.at_triangles.len) };
+                let look = unsafe { looks.get_unchecked_mut(triangles) };
                 let state = self.lane(lane);
                 let stays = state.look_at_leaf(token, bvh, look);
-                let current = state.current;
-                self.at_triangles.push_if(lane, stays);
-                self.sort(lane, current, !stays);
+                let leaf = state.current.is_leaf();
+                at_triangles.push_if(&mut triangles, lane, stays);
+                at_node.push_if(&mut nodes, lane, !leaf);
+                at_rest.push_if(&mut rest, lane, leaf & !stays);
             }
-            for place in 0..self.at_triangles.take() {
-                let (lane, bvh) = (self.at_triangles.get(place), self.bvh);
+            for place in 0..triangles {
+                let (lane, bvh) = (at_triangles.get(place), self.bvh);
                 // SAFETY: written when the lane came to this place of the list.
                 let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
                 let state = self.lane(lane);
                 state.test_triangles::<T, N, S, Q>(token, bvh, look);
-                let current = state.current;
-                self.sort(lane, current, true);
+                let leaf = state.current.is_leaf();
+                at_node.push_if(&mut nodes, lane, !leaf);
+                at_rest.push_if(&mut rest, lane, leaf);
             }
-            for place in 0..self.at_end.take() {
-                let lane = self.at_end.get(place);
+            for place in 0..ends {
+                let lane = at_end.get(place);
                 self.finish(lane);
-                self.start(token, lane);
+                let started = self.start(token, lane);
+                let leaf = self.bvh.root().is_leaf();
+                at_node.push_if(&mut nodes, lane, started & !leaf);
+                at_rest.push_if(&mut rest, lane, started & leaf);
             }
         }
     }
@@ -167,15 +178,6 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
     fn lane(&mut self, lane: usize) -> &mut Lane {
         // SAFETY: lists have numbers of lanes in which `start` has put a ray.
         unsafe { self.lanes.get_unchecked_mut(lane).assume_init_mut() }
-    }
-
-    /// Puts a lane into the list for what it has come to, if `go`.
-    #[inline(always)]
-    fn sort(&mut self, lane: usize, current: Link, go: bool) {
-        let (leaf, end) = (current.is_leaf(), current == BOTTOM);
-        self.at_node.push_if(lane, go & !leaf);
-        self.at_leaf.push_if(lane, go & leaf & !end);
-        self.at_end.push_if(lane, go & end);
     }
 
     /// The number of the next ray to start.
@@ -190,12 +192,12 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
         Some(64 * self.group + place)
     }
 
-    /// Starts the next ray that may hit something, if there is one.
+    /// Starts the next ray that may hit something. Whether there is one.
     #[inline(always)]
-    fn start<T: Simd>(&mut self, token: T, lane: usize) {
+    fn start<T: Simd>(&mut self, token: T, lane: usize) -> bool {
         while let Some(index) = self.next() {
             let Some(ray) = self.rays.get(index) else {
-                return;
+                return false;
             };
             let mut room = PreparedRay::ROOM;
             let Some(prepared) = PreparedRay::new(ray, &mut room) else {
@@ -208,9 +210,9 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
             // SAFETY: `lane` is one of them.
             let state = unsafe { self.lanes.get_unchecked_mut(lane) };
             Lane::start::<T, N>(token, state, root, &self.scene, &prepared, index);
-            self.sort(lane, root, true);
-            return;
+            return true;
         }
+        false
     }
 
     /// Writes down a lane's answer.
@@ -385,35 +387,29 @@ impl Lane {
     }
 }
 
-/// Lanes that are to do the same next.
-struct List {
-    lanes: [u8; MOST_LANES + 1],
-    len: usize,
-}
+/// Lanes that are to do the same next. How many is known apart.
+struct List([u8; MOST_LANES + 1]);
 
 impl List {
-    const EMPTY: Self = Self {
-        lanes: [0; MOST_LANES + 1],
-        len: 0,
-    };
-
-    /// Empties the list. Its places can be read until others are pushed over them.
-    #[inline(always)]
-    fn take(&mut self) -> usize {
-        core::mem::take(&mut self.len)
-    }
+    const EMPTY: Self = Self([0; MOST_LANES + 1]);
 
     #[inline(always)]
     fn get(&self, place: usize) -> usize {
-        // SAFETY: `place` was below `len`, which is at most the number of lanes.
-        usize::from(unsafe { *self.lanes.get_unchecked(place) })
+        // SAFETY: `place` was below the length, which is at most the number of lanes.
+        usize::from(unsafe { *self.0.get_unchecked(place) })
     }
 
     /// Written always, kept or not: no branch.
     #[inline(always)]
-    fn push_if(&mut self, lane: usize, wanted: bool) {
-        // SAFETY: a lane is in one list once at most, so `len` is at most `MOST_LANES`.
-        unsafe { *self.lanes.get_unchecked_mut(self.len) = lane as u8 };
-        self.len += usize::from(wanted);
+    fn push_if(&mut self, len: &mut usize, lane: usize, wanted: bool) {
+        // SAFETY: a lane is in a list once at most, so `len` is at most `MOST_LANES`.
+        unsafe { *self.0.get_unchecked_mut(*len) = lane as u8 };
+        *len += usize::from(wanted);
     }
+}
+
+/// Empties a list. Its places can be read until others are pushed over them.
+#[inline(always)]
+fn take(len: &mut usize) -> usize {
+    core::mem::take(len)
 }
