@@ -241,7 +241,7 @@ impl Lane {
         index: usize,
     ) {
         let reciprocal = prepared.reciprocal::<T::F32x4>(token);
-        let slabs = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
+        let (slabs, open) = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
         let lane = lane.as_mut_ptr();
         // SAFETY: fields of memory that is there; the stacks need not be written.
         unsafe {
@@ -250,6 +250,9 @@ impl Lane {
             (&raw mut (*lane).far).write(prepared.ray.t_max + slabs.margin());
             (&raw mut (*lane).t_max).write(prepared.ray.t_max);
             (&raw mut (*lane).slabs).write(slabs);
+            if open {
+                (*lane).slabs.open();
+            }
             (&raw mut (*lane).ray).write(*prepared.ray);
             (&raw mut (*lane).axes).write(prepared.axes);
             let z = prepared.axes[2] % 4;
@@ -276,11 +279,13 @@ impl Lane {
         let (hit, near) = node.test(token, &slabs, far);
         let mask = hit.bits();
         let links = node.link_lanes(token);
-        let above = self.top + 1;
+        // Read once: it might be in what is written below, for all that the compiler sees.
+        let top = self.top;
+        let above = top + 1;
         // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children behind, which `top` is at
         // most, and a vector's worth of places is above them. `top` and those below were written. `child` is a lane.
         unsafe {
-            let last = self.links.get_unchecked(self.top).assume_init();
+            let last = self.links.get_unchecked(top).assume_init();
             let above_links = self.links.as_mut_ptr().add(above).cast();
             let child = if Q::CLOSEST {
                 let nearest = near.least(hit);
@@ -296,7 +301,7 @@ impl Lane {
             let child = *node.links().get_unchecked(child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
-        self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);
+        self.top = (top + mask.count_ones() as usize).wrapping_sub(1);
 
         // Not by a branch, nor anything that may become one.
         let node = nodes as usize + self.current.node_offset();
