@@ -5,6 +5,7 @@
 
 mod batch;
 mod bundle;
+mod classes;
 mod count;
 mod primitives;
 mod query;
