@@ -260,6 +260,18 @@ fn offenders_are_named_and_change_nothing() {
     assert!(bvh.bounds().is_empty());
 }
 
+/// Parts may list primitives that no leaf has: those are in no hierarchy.
+#[test]
+fn what_is_listed_and_in_no_leaf_was_left_out() {
+    let mesh = shapes::soup(40, 5);
+    let view = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+    let built = Builder::new().build(&view).unwrap();
+    let mut bare =
+        Bvh8::from_parts(vec![], vec![], built.primitives().to_vec(), *built.bounds()).unwrap();
+    let left_out = RefitError::PrimitiveLeftOut { primitive: 0 };
+    assert_eq!(bare.refit(&view), Err(left_out));
+}
+
 /// A strip whose every triangle has vertices of its own.
 #[test]
 fn vertices_that_part() {

@@ -18,16 +18,16 @@ use std::{vec, vec::Vec};
 /// boxes made of theirs.
 ///
 /// # Errors
-/// The first place that lists a primitive that is not there; the first primitive that is in no leaf; more
-/// places than a tree may have.
+/// The first place that lists a primitive that is not there; the first of `refs`' primitives that is in no leaf;
+/// more places than a tree may have.
 pub(super) fn adopt<I: Input>(
     input: &I,
     tree: &BinaryTree,
     refs: &Refs,
     watch: &Watch,
 ) -> Result<BinaryTree, BuildError> {
-    check(input, tree)?;
     let places = Places::new(input.len(), &refs.refs);
+    check(input, tree, &places)?;
     let counts = counts(tree, &places);
     let total = counts.first().copied().unwrap_or(0);
     if total > TriangleMesh::MAX_TRIANGLES {
@@ -60,8 +60,8 @@ fn listed<'a>(tree: &'a BinaryTree, leaf: &BinaryNode) -> core::slice::Iter<'a, 
     tree.order()[first..first + leaf.count as usize].iter()
 }
 
-/// Every primitive is listed in a leaf, and no other.
-fn check<I: Input>(input: &I, tree: &BinaryTree) -> Result<(), BuildError> {
+/// Every primitive that is kept is listed in a leaf, and none that is not there.
+fn check<I: Input>(input: &I, tree: &BinaryTree, places: &Places) -> Result<(), BuildError> {
     let primitives = input.len();
     let mut is_listed = vec![false; primitives];
     let mut offender: Option<usize> = None;
@@ -80,7 +80,8 @@ fn check<I: Input>(input: &I, tree: &BinaryTree) -> Result<(), BuildError> {
             primitives,
         });
     }
-    match is_listed.iter().position(|is_listed| !is_listed) {
+    let missing = |primitive: &usize| !is_listed[*primitive] && places.is_kept(*primitive as u32);
+    match (0..primitives).find(missing) {
         Some(primitive) => Err(BuildError::PrimitiveMissing { primitive }),
         None => Ok(()),
     }

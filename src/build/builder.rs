@@ -5,7 +5,7 @@ use super::{
     compact::compact,
     input::{Boxes, Input, Triangles, TrianglesInRuns},
     monitor::{Monitored, Watch},
-    pipeline,
+    pipeline::{self, Wants},
     refs::Refs,
 };
 use crate::{
@@ -210,7 +210,7 @@ impl<'m> Builder<'m> {
     ///
     /// # Errors
     /// As [`build`](Self::build); the first place of the tree's order with a triangle that is not in the mesh, or the
-    /// first triangle that is in no leaf.
+    /// first triangle that is in no leaf and would not be left out.
     pub fn build_from_tree(
         &self,
         mesh: &TriangleMesh,
@@ -249,9 +249,12 @@ impl<'m> Builder<'m> {
         &self,
         input: &I,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-        let watch = Watch::new(self.monitored);
-        let refs = Refs::gather(input, self.drop_non_finite, &watch)?;
-        pipeline::from_refs(input, refs, self.preset, self.splits, &watch)
+        let wants = Wants {
+            preset: self.preset,
+            drop_non_finite: self.drop_non_finite,
+            splits: self.splits,
+        };
+        pipeline::build(input, wants, &Watch::new(self.monitored))
     }
 
     fn compact_over<N: WideNode, I: Input<Leaf = PrimitiveLeaf>>(

@@ -11,10 +11,12 @@ use super::{
     binary::{BinaryNode, BinaryTree},
     cost::{self, Measure},
     emit::Shape,
-    input::Input,
+    input::{Input, leaf_of},
     monitor::{STRIDE, Watch},
+    ploc::Node,
     sweep::Leaves,
 };
+use crate::{geometry::Aabb, simd::Backend};
 use core::ops::Range;
 use std::{vec, vec::Vec};
 use wide::f32x4;
@@ -69,29 +71,9 @@ impl<'a, const W: usize> Collapse<'a, W> {
                 order: tree.order(),
                 tried: leaves.below,
                 measure: Measure::of_bounds(&root.aabb),
+                backend: Backend::detect(),
             };
             solver.solve_all(&mut entries, watch);
-        }
-        Self { nodes, entries }
-    }
-
-    /// Of a tree whose children come after their parents, and whose leaves stay what they are.
-    pub fn of_leaves<I: Input>(input: &I, nodes: &'a [BinaryNode], watch: &Watch) -> Self {
-        let mut entries = vec![Entry::NONE; nodes.len()];
-        if let Some(root) = nodes.first() {
-            let solver = Solver::<W, I> {
-                input,
-                nodes,
-                order: &[],
-                tried: f32::MAX,
-                measure: Measure::of_bounds(&root.aabb),
-            };
-            for node in (0..nodes.len()).rev() {
-                entries[node] = solver.solve(node, &entries, 0);
-                if node % STRIDE == 0 {
-                    watch.advance(STRIDE);
-                }
-            }
         }
         Self { nodes, entries }
     }
@@ -105,51 +87,194 @@ impl<'a, const W: usize> Collapse<'a, W> {
 }
 
 impl<const W: usize> Shape<W> for Collapse<'_, W> {
+    fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn root(&self) -> usize {
+        0
+    }
+
+    fn aabb(&self, node: usize) -> &Aabb {
+        &self.nodes[node].aabb
+    }
+
     fn is_leaf(&self, node: usize) -> bool {
         self.entries[node].is_leaf
     }
 
-    /// In the binary tree's order.
     fn children(&self, node: usize) -> ([usize; W], usize) {
-        let (mut children, mut count) = ([0; W], 0);
-        // Forests still to be taken apart, and how many roots each may have: never more than W in all.
-        let mut todo = [(0, 0); W];
-        let mut len = self.cut(node, W, &mut todo);
-        while len > 0 {
-            len -= 1;
-            let (node, mut roots) = todo[len];
-            // As few roots as do for the cost.
-            let forest = &self.entries[node].forest;
-            while roots > 1 && forest[roots - 2] <= forest[roots - 1] {
-                roots -= 1;
-            }
-            if roots == 1 {
-                children[count] = node;
-                count += 1;
-            } else {
-                len += self.cut(node, roots, &mut todo[len..]);
-            }
-        }
-        (children, count)
+        children(self, node)
     }
 }
 
-impl<const W: usize> Collapse<'_, W> {
-    /// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
-    fn cut(&self, node: usize, roots: usize, out: &mut [(usize, usize)]) -> usize {
-        let [left, right] = self.nodes[node].children();
-        let cost =
-            |k: usize| self.entries[left].forest[k - 1] + self.entries[right].forest[roots - k - 1];
-        let mut best = 1;
+impl<const W: usize> Forests for Collapse<'_, W> {
+    fn forest(&self, node: usize) -> [f32; MAX_WIDTH] {
+        self.entries[node].forest
+    }
+
+    fn below(&self, node: usize) -> [usize; 2] {
+        self.nodes[node].children()
+    }
+}
+
+/// The cheapest collapse of a tree whose leaves stay what they are.
+pub(super) struct LeafCollapse<'a, const W: usize> {
+    nodes: &'a [Node],
+    measure: Measure,
+    leaf_cost: fn(usize) -> f32,
+    /// C(n, 1) to C(n, W) of nodes that are no leaves.
+    forests: Vec<[f32; MAX_WIDTH]>,
+}
+
+impl<'a, const W: usize> LeafCollapse<'a, W> {
+    pub fn new<I: Input>(nodes: &'a [Node], watch: &Watch) -> Self {
+        let bounds = nodes.last().map_or(Aabb::EMPTY, |root| root.aabb);
+        let mut collapse = Self {
+            nodes,
+            measure: Measure::of_bounds(&bounds),
+            leaf_cost: I::leaf_cost,
+            forests: vec![[0.0; _]; nodes.len()],
+        };
+        for (index, node) in nodes.iter().enumerate() {
+            if index % STRIDE == 0 {
+                watch.advance(STRIDE);
+            }
+            if node.is_leaf() {
+                continue;
+            }
+            let [left, right] = node.children().map(|child| collapse.forest(child));
+            let mut forest = forest::<W>(&left, &right);
+            forest[0] = forest[W - 1] + collapse.measure.half_area(&node.aabb) * cost::NODE;
+            least_so_far::<W>(&mut forest);
+            collapse.forests[index] = forest;
+        }
+        collapse
+    }
+}
+
+impl<const W: usize> Forests for LeafCollapse<'_, W> {
+    #[inline(always)]
+    fn forest(&self, node: usize) -> [f32; MAX_WIDTH] {
+        let of = &self.nodes[node];
+        match of.is_leaf() {
+            true => [self.measure.half_area(&of.aabb) * (self.leaf_cost)(of.count()); _],
+            false => self.forests[node],
+        }
+    }
+
+    #[inline(always)]
+    fn below(&self, node: usize) -> [usize; 2] {
+        self.nodes[node].children()
+    }
+}
+
+impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
+    fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn root(&self) -> usize {
+        self.nodes.len() - 1
+    }
+
+    fn aabb(&self, node: usize) -> &Aabb {
+        &self.nodes[node].aabb
+    }
+
+    fn is_leaf(&self, node: usize) -> bool {
+        self.nodes[node].is_leaf()
+    }
+
+    fn children(&self, node: usize) -> ([usize; W], usize) {
+        children(self, node)
+    }
+}
+
+/// What a tree's collapse is read from.
+trait Forests {
+    /// C(n, 1) to C(n, W).
+    fn forest(&self, node: usize) -> [f32; MAX_WIDTH];
+    /// The two children of a node.
+    fn below(&self, node: usize) -> [usize; 2];
+}
+
+/// The children of a node that becomes a wide one, in the binary tree's order.
+#[inline(always)]
+fn children<const W: usize>(forests: &impl Forests, node: usize) -> ([usize; W], usize) {
+    let (mut children, mut count) = ([0; W], 0);
+    // Forests still to be taken apart, and how many roots each may have: never more than W in all.
+    let mut todo = [(0, 0); W];
+    let mut len = cut(forests, node, W, &mut todo);
+    while len > 0 {
+        len -= 1;
+        let (node, mut roots) = todo[len];
+        if roots > 1 {
+            // As few roots as do for the cost.
+            let forest = forests.forest(node);
+            while roots > 1 && forest[roots - 2] <= forest[roots - 1] {
+                roots -= 1;
+            }
+        }
+        if roots == 1 {
+            children[count] = node;
+            count += 1;
+        } else {
+            len += cut(forests, node, roots, &mut todo[len..]);
+        }
+    }
+    (children, count)
+}
+
+/// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
+#[inline(always)]
+fn cut(forests: &impl Forests, node: usize, roots: usize, out: &mut [(usize, usize)]) -> usize {
+    let [left, right] = forests.below(node);
+    let mut best = 1;
+    if roots > 2 {
+        let (lefts, rights) = (forests.forest(left), forests.forest(right));
+        let cost = |k: usize| lefts[k - 1] + rights[roots - k - 1];
         for k in 2..roots {
             if cost(k) < cost(best) {
                 best = k;
             }
         }
-        out[0] = (right, roots - best);
-        out[1] = (left, best);
-        2
     }
+    out[0] = (right, roots - best);
+    out[1] = (left, best);
+    2
+}
+
+/// At most so many roots, not just so many.
+#[inline(always)]
+fn least_so_far<const W: usize>(forest: &mut [f32; MAX_WIDTH]) {
+    for i in 1..W {
+        if forest[i - 1] < forest[i] {
+            forest[i] = forest[i - 1];
+        }
+    }
+}
+
+/// C(left, k) + C(right, i - k), the least over k, for all i from 2 on; in the first place is nothing.
+#[inline(always)]
+fn forest<const W: usize>(left: &[f32; MAX_WIDTH], right: &[f32; MAX_WIDTH]) -> [f32; MAX_WIDTH] {
+    // Row k is `right` after k places that are never the least.
+    let mut shifted = [f32::INFINITY; 2 * MAX_WIDTH];
+    shifted[MAX_WIDTH..].copy_from_slice(right);
+    let row = |k: usize| {
+        let at = |lane: usize| shifted[MAX_WIDTH - k + lane];
+        let low = f32x4::new([at(0), at(1), at(2), at(3)]);
+        (low, f32x4::new([at(4), at(5), at(6), at(7)]))
+    };
+    let mut least = [f32x4::splat(f32::INFINITY); 2];
+    for (k, &left) in (1..W).zip(left) {
+        let (low, high) = row(k);
+        let left = f32x4::splat(left);
+        least[0] = least[0].fast_min(low + left);
+        least[1] = least[1].fast_min(high + left);
+    }
+    let [[a, b, c, d], [e, f, g, h]] = [least[0].to_array(), least[1].to_array()];
+    [a, b, c, d, e, f, g, h]
 }
 
 struct Solver<'a, const W: usize, I> {
@@ -159,6 +284,7 @@ struct Solver<'a, const W: usize, I> {
     /// Half the area of nodes up to which it is known that there are no more leaves than those that there are.
     tried: f32,
     measure: Measure,
+    backend: Backend,
 }
 
 impl<const W: usize, I: Input> Solver<'_, W, I> {
@@ -243,7 +369,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
 
         let [left, right] = self.nodes[node].children();
         let (left, right) = (&entries[left - start], &entries[right - start]);
-        let mut forest = Self::forest(&left.forest, &right.forest);
+        let mut forest = forest::<W>(&left.forest, &right.forest);
         // The least of W roots, under one node.
         forest[0] = forest[W - 1] + area * cost::NODE;
 
@@ -254,7 +380,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         if fits {
             let places = self.order.get(first as usize..).unwrap_or(&[]);
             let ids = places.get(..count as usize);
-            fits = ids.is_some_and(|ids| self.input.fits(ids));
+            fits = ids.is_some_and(|ids| leaf_of(self.backend, self.input, ids, 0).is_some());
         }
         let mut is_leaf = false;
         if fits {
@@ -264,11 +390,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
                 forest[0] = leaf;
             }
         }
-        for i in 1..W {
-            if forest[i - 1] < forest[i] {
-                forest[i] = forest[i - 1];
-            }
-        }
+        least_so_far::<W>(&mut forest);
         Entry {
             forest,
             first,
@@ -276,28 +398,6 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             fits,
             is_leaf,
         }
-    }
-
-    /// C(left, k) + C(right, i - k), the least over k, for all i from 2 on; in the first place is nothing.
-    #[inline(always)]
-    fn forest(left: &[f32; MAX_WIDTH], right: &[f32; MAX_WIDTH]) -> [f32; MAX_WIDTH] {
-        // Row k is `right` after k places that are never the least.
-        let mut shifted = [f32::INFINITY; 2 * MAX_WIDTH];
-        shifted[MAX_WIDTH..].copy_from_slice(right);
-        let row = |k: usize| {
-            let at = |lane: usize| shifted[MAX_WIDTH - k + lane];
-            let low = f32x4::new([at(0), at(1), at(2), at(3)]);
-            (low, f32x4::new([at(4), at(5), at(6), at(7)]))
-        };
-        let mut least = [f32x4::splat(f32::INFINITY); 2];
-        for (k, &left) in (1..W).zip(left) {
-            let (low, high) = row(k);
-            let left = f32x4::splat(left);
-            least[0] = least[0].fast_min(low + left);
-            least[1] = least[1].fast_min(high + left);
-        }
-        let [[a, b, c, d], [e, f, g, h]] = [least[0].to_array(), least[1].to_array()];
-        [a, b, c, d, e, f, g, h]
     }
 }
 

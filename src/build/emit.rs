@@ -2,15 +2,16 @@
 
 use super::{
     BuildError,
-    binary::{BinaryNode, BinaryTree},
+    binary::BinaryTree,
     collapse::Collapse,
     cost::Measure,
-    input::Input,
+    input::{Input, leaf_of},
     monitor::Watch,
 };
 use crate::{
     geometry::Aabb,
     layout::{Child, LayoutError, STACK, WideNode},
+    simd::Backend,
 };
 use core::ops::Range;
 use std::vec::Vec;
@@ -25,6 +26,12 @@ pub(super) struct Parts<N, L> {
 
 /// What a binary tree is collapsed to.
 pub(super) trait Shape<const W: usize> {
+    /// How many binary nodes there are.
+    fn len(&self) -> usize;
+    /// The root, if there are any.
+    fn root(&self) -> usize;
+    /// A node's box.
+    fn aabb(&self, node: usize) -> &Aabb;
     /// Whether a node becomes a leaf.
     fn is_leaf(&self, node: usize) -> bool;
     /// The children of a node that becomes a wide one, and how many.
@@ -41,10 +48,10 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     collapse: &Collapse<W>,
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
-    let (nodes, leaves) = walk(tree.nodes(), collapse, watch)?;
+    let (nodes, leaves) = walk(collapse, watch)?;
     let ranges: Vec<_> = leaves
         .into_iter()
-        .map(|leaf| collapse.places(leaf))
+        .map(|leaf| collapse.places(leaf as usize))
         .collect();
     let (leaves, primitives) = fill(input, tree.order(), &ranges, watch)?;
     watch.check()?;
@@ -62,23 +69,24 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
 /// # Errors
 /// As [`emit`].
 pub(super) fn walk<N: WideNode, const W: usize>(
-    binary: &[BinaryNode],
     shape: &impl Shape<W>,
     watch: &Watch,
-) -> Result<(Vec<N>, Vec<usize>), BuildError> {
-    let mut nodes = Vec::new();
-    let mut leaves = Vec::new();
-    let Some(root) = binary.first() else {
-        return Ok((nodes, leaves));
-    };
-    let measure = Measure::of_bounds(&root.aabb);
+) -> Result<(Vec<N>, Vec<u32>), BuildError> {
+    if shape.len() == 0 {
+        return Ok((Vec::new(), Vec::new()));
+    }
+    // Most trees have more than four leaves a wide node. What is not used is not touched.
+    let mut nodes = Vec::with_capacity(shape.len() / 8 + 1);
+    let mut leaves = Vec::with_capacity(shape.len() / 2 + 1);
+    let root = shape.root();
+    let measure = Measure::of_bounds(shape.aabb(root));
     // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
     let mut todo = Vec::new();
-    if shape.is_leaf(0) {
-        leaves.push(0);
+    if shape.is_leaf(root) {
+        leaves.push(root as u32);
     } else {
         nodes.push(N::zeroed());
-        todo.push((0, 0, 0));
+        todo.push((root, 0, 0));
     }
     while let Some((node, place, used)) = todo.pop() {
         let (children, count) = shape.children(node);
@@ -89,7 +97,7 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         // The likeliest first: its nodes follow, close by.
         let mut lanes = [(0.0, 0); W];
         for (lane, &child) in children[..count].iter().enumerate() {
-            let area = measure.half_area(&binary[child].aabb);
+            let area = measure.half_area(shape.aabb(child));
             // By insertion: there are few, and equals stay in order.
             let mut place = lane;
             while place > 0 && lanes[place - 1].0 < area {
@@ -101,14 +109,14 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         let (known, first) = (todo.len(), nodes.len());
         let lanes = lanes[..count].iter().map(|&(_, child)| {
             let link = if shape.is_leaf(child) {
-                leaves.push(child);
+                leaves.push(child as u32);
                 Child::leaf(leaves.len() as u32 - 1)
             } else {
                 let place = first + todo.len() - known;
                 todo.push((child, place, used));
                 Child::node(place as u32)
             };
-            (binary[child].aabb, link)
+            (*shape.aabb(child), link)
         });
         nodes[place] = N::from_children(lanes);
         nodes.resize(first + todo.len() - known, N::zeroed());
@@ -117,6 +125,7 @@ pub(super) fn walk<N: WideNode, const W: usize>(
             return Err(BuildError::Cancelled);
         }
     }
+    nodes.shrink_to_fit();
     Ok((nodes, leaves))
 }
 
@@ -145,13 +154,11 @@ fn fill<I: Input>(
         primitives.truncate(end);
         ends.push(primitives.len());
     }
+    let backend = Backend::detect();
     let leaf = |(index, ends): (usize, &[usize])| {
         watch.advance(1);
-        let mut filling = I::EMPTY;
-        let mut ids = primitives[ends[0]..ends[1]].iter();
-        let fits = ids.all(|&id| input.add(&mut filling, id));
-        let leaf = I::leaf(&filling, ends[0] as u32).filter(|_| fits);
-        leaf.ok_or(LayoutError::Leaf(index))
+        let ids = &primitives[ends[0]..ends[1]];
+        leaf_of(backend, input, ids, ends[0] as u32).ok_or(LayoutError::Leaf(index))
     };
     #[cfg(feature = "rayon")]
     let leaves = {

@@ -33,7 +33,7 @@ pub enum BuildError {
     /// [`TriangleMesh::MAX_TRIANGLES`](crate::geometry::TriangleMesh::MAX_TRIANGLES), or a tree that
     /// lists them this often.
     TooManyPrimitives(usize),
-    /// No leaf of the tree lists this primitive.
+    /// No leaf of the tree lists this primitive, which can be hit.
     PrimitiveMissing {
         /// The primitive.
         primitive: usize,

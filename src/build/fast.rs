@@ -1,92 +1,179 @@
 //! The fast way: leaves of neighbours along a curve, then a tree over leaves, from the bottom up.
 
 use super::{
-    BinaryNode, BuildError,
-    collapse::Collapse,
+    BuildError,
+    collapse::LeafCollapse,
     emit::{Parts, walk},
     input::Input,
     monitor::Watch,
-    morton,
-    ploc::{self, Part},
-    refs::Refs,
+    morton::{self, Curve},
+    ploc::{self, Node},
     runs::{self, Runs},
 };
-use crate::{
-    geometry::Aabb,
-    layout::{LayoutError, WideNode},
-};
+use crate::{geometry::Aabb, layout::WideNode};
 use std::vec::Vec;
 
 /// So many primitives are one task, along the curve.
 const PART: usize = 1 << 12;
+/// One of so many clusters of a part is left for those of other parts to be joined with.
+const LEFT: usize = 16;
 
-/// The parts of a hierarchy over `refs`.
+/// The parts of a hierarchy over all primitives that have a place in it, and how many were left out for not being
+/// finite.
 ///
 /// # Errors
-/// The tree is too deep; or the build was cancelled.
+/// The first primitive that is not finite, unless those are left out, or too many; the tree is too deep; or the build
+/// was cancelled.
 pub(super) fn build<N: WideNode, I: Input, const W: usize>(
     input: &I,
-    refs: &Refs,
+    drop_non_finite: bool,
     watch: &Watch,
-) -> Result<Parts<N, I::Leaf>, BuildError> {
+) -> Result<(Parts<N, I::Leaf>, usize), BuildError> {
+    let curve = morton::curve(input, drop_non_finite, watch)?;
     let Grown {
-        order,
-        leaves,
-        nodes,
-    } = grow(input, refs, watch)?;
-    let collapse = Collapse::<W>::of_leaves(input, &nodes, watch);
+        mut leaves, nodes, ..
+    } = Grown::of(input, &curve, watch)?;
     watch.phase(0.93, nodes.len())?;
-    let (wide, led_to) = walk(&nodes, &collapse, watch)?;
-    watch.phase(1.0, led_to.len())?;
-    let leaf = |&node: &usize| {
-        watch.advance(1);
-        let number = nodes[node].first as usize;
-        leaves.get(number / PART)?.get(number % PART).copied()
-    };
-    let leaves = led_to.iter().map(leaf).collect::<Option<_>>();
-    Ok(Parts {
-        nodes: wide,
-        leaves: leaves.ok_or(LayoutError::Leaf(0))?,
-        primitives: order,
-        bounds: nodes.first().map_or(Aabb::EMPTY, |root| root.aabb),
-    })
-}
-
-struct Grown<L> {
-    /// The primitives along the curve.
-    order: Vec<u32>,
-    /// By part: number `n` is in part `n / PART`.
-    leaves: Vec<Vec<L>>,
-    /// Of the binary tree; `first` of a leaf is its number.
-    nodes: Vec<BinaryNode>,
-}
-
-fn grow<I: Input>(input: &I, refs: &Refs, watch: &Watch) -> Result<Grown<I::Leaf>, BuildError> {
-    let scale = refs.scale();
-    let refs = &refs.refs;
-    watch.phase(0.3, refs.len())?;
-    let mut order = morton::order(refs, watch);
-    watch.phase(0.7, refs.len())?;
-    let part = |(index, places): (usize, &[u32])| {
-        let Runs { leaves, nodes, .. } = runs::cut(input, refs, places, index * PART, watch);
-        (leaves, Part::new(nodes, scale, watch))
-    };
-    #[cfg(feature = "rayon")]
-    let (leaves, parts): (Vec<_>, Vec<_>) = {
-        use rayon::prelude::*;
-        order.par_chunks(PART).enumerate().map(part).unzip()
-    };
-    #[cfg(not(feature = "rayon"))]
-    let (leaves, parts): (Vec<_>, Vec<_>) = order.chunks(PART).enumerate().map(part).unzip();
-    watch.phase(0.8, leaves.len())?;
-    let nodes = ploc::tree(&parts, scale, watch);
+    let collapse = LeafCollapse::<W>::new::<I>(&nodes, watch);
+    watch.phase(1.0, nodes.len())?;
+    let (wide, mut order) = walk(&collapse, watch)?;
     for place in &mut order {
-        *place = refs[*place as usize].id();
+        *place = nodes[*place as usize].number() as u32;
     }
-    watch.phase(0.9, nodes.len())?;
-    Ok(Grown {
-        order,
+    permute(&mut leaves, &mut order);
+    leaves.shrink_to_fit();
+    let parts = Parts {
+        nodes: wide,
         leaves,
-        nodes,
-    })
+        primitives: curve.order,
+        bounds: nodes.last().map_or(Aabb::EMPTY, |root| root.aabb),
+    };
+    Ok((parts, curve.dropped))
+}
+
+/// Puts in each place what was in the place that `from` has for it, every place once. In the end `from` has each
+/// place's own.
+fn permute<T: Copy>(all: &mut [T], from: &mut [u32]) {
+    for start in 0..from.len() {
+        let first = all[start];
+        let mut place = start;
+        loop {
+            let next = core::mem::replace(&mut from[place], place as u32) as usize;
+            if next == start {
+                break;
+            }
+            all[place] = all[next];
+            place = next;
+        }
+        all[place] = first;
+    }
+}
+
+/// Leaves and the tree over them.
+struct Grown<L> {
+    leaves: Vec<L>,
+    /// The root last.
+    nodes: Vec<Node>,
+    /// What is not joined yet.
+    roots: Vec<u32>,
+}
+
+impl<L: Copy + Send> Grown<L> {
+    /// Room for what comes of so many primitives; seldom it takes more. What is not used is not touched.
+    fn with_room(primitives: usize) -> Self {
+        let leaves = primitives / 8 * 3 + 1;
+        Self {
+            leaves: Vec::with_capacity(leaves),
+            nodes: Vec::with_capacity(2 * leaves),
+            roots: Vec::new(),
+        }
+    }
+
+    /// Over all that is on the curve.
+    ///
+    /// # Errors
+    /// The build was cancelled.
+    fn of<I: Input<Leaf = L>>(input: &I, curve: &Curve, watch: &Watch) -> Result<Self, BuildError> {
+        let &Curve {
+            ref order, scale, ..
+        } = curve;
+        watch.phase(0.8, 2 * order.len())?;
+        let mut all = Self::with_room(order.len());
+        #[cfg(feature = "rayon")]
+        if rayon::current_num_threads() > 1 {
+            use rayon::prelude::*;
+            let part = |(index, ids): (usize, &[u32])| {
+                let mut part = Self::with_room(ids.len());
+                part.grow(input, ids, index * PART, scale, watch);
+                part
+            };
+            let parts: Vec<_> = order.par_chunks(PART).enumerate().map(part).collect();
+            parts.iter().for_each(|part| all.append(part));
+            return all.finish(scale, watch);
+        }
+        for (ids, first) in order.chunks(PART).zip((0..).step_by(PART)) {
+            all.grow(input, ids, first, scale, watch);
+        }
+        all.finish(scale, watch)
+    }
+
+    /// Adds a part: joined apart from the rest, it is on one core, and in its cache.
+    fn grow<I: Input<Leaf = L>>(
+        &mut self,
+        input: &I,
+        ids: &[u32],
+        first: usize,
+        scale: f32,
+        watch: &Watch,
+    ) {
+        if !watch.advance(ids.len()) {
+            return;
+        }
+        let start = self.nodes.len() as u32;
+        let runs = Runs {
+            leaves: &mut self.leaves,
+            nodes: &mut self.nodes,
+        };
+        runs::cut(input, ids, first, scale, runs);
+        let clusters: Vec<_> = (start..self.nodes.len() as u32).collect();
+        let until = clusters.len() / LEFT;
+        let roots = ploc::join(&mut self.nodes, clusters, until, scale, watch);
+        self.roots.extend(roots);
+    }
+
+    /// Adds a part that was grown elsewhere.
+    fn append(&mut self, part: &Self) {
+        let (leaves, nodes) = (self.leaves.len() as u32, self.nodes.len() as u32);
+        self.roots
+            .extend(part.roots.iter().map(|root| root + nodes));
+        let after = part.nodes.iter().map(|node| node.after(leaves, nodes));
+        self.nodes.extend(after);
+        self.leaves.extend_from_slice(&part.leaves);
+    }
+
+    /// Joins what is left.
+    fn finish(mut self, scale: f32, watch: &Watch) -> Result<Self, BuildError> {
+        let roots = core::mem::take(&mut self.roots);
+        watch.phase(0.9, roots.len())?;
+        ploc::join(&mut self.nodes, roots, 1, scale, watch);
+        watch.check()?;
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn permuted() {
+        for count in [0, 1, 2, 9, 30] {
+            // 7 has no factor in common with one more.
+            let from: Vec<u32> = (1..=count).map(|i| 7 * i % (count + 1) - 1).collect();
+            let expected: Vec<_> = from.iter().map(|place| 10 * place).collect();
+            let mut all: Vec<_> = (0..count).map(|i| 10 * i).collect();
+            permute(&mut all, &mut from.clone());
+            assert_eq!(all, expected);
+        }
+    }
 }

@@ -1,206 +1,141 @@
 //! A leaf of triangles while it is filled: which vertices it has so far.
 
 use crate::{
-    geometry::{Aabb, TriangleMesh},
+    geometry::TriangleMesh,
     layout::TriangleLeaf,
+    simd::{Lanes, Simd, Vector, splat3},
 };
-use glam::Vec3;
-use wide::{f32x4, f32x8, u32x8};
 
 const MOST: usize = TriangleLeaf::MAX_VERTICES;
 
-/// A triangle's vertices, by number and place.
+/// Where a triangle's vertices are. The fourth of each is 0.
 #[derive(Clone, Copy)]
-pub(super) struct Corners {
-    numbers: [u32; 3],
-    positions: [[f32; 3]; 3],
-}
+pub(super) struct Corners(pub [[f32; 4]; 3]);
 
 impl Corners {
-    pub const NONE: Self = Self {
-        numbers: [0; 3],
-        positions: [[0.0; 3]; 3],
-    };
+    pub const NONE: Self = Self([[0.0; 4]; 3]);
 
     #[inline(always)]
     pub fn new(mesh: &TriangleMesh, id: u32) -> Self {
-        let numbers = mesh.indices()[id as usize];
-        let [a, b, c] = numbers;
-        let at = |number: u32| mesh.positions()[number as usize];
-        Self {
-            numbers,
-            positions: [at(a), at(b), at(c)],
-        }
+        let [a, b, c] = mesh.indices()[id as usize];
+        let positions = mesh.positions();
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = [
+            positions[a as usize],
+            positions[b as usize],
+            positions[c as usize],
+        ];
+        Self([[ax, ay, az, 0.0], [bx, by, bz, 0.0], [cx, cy, cz, 0.0]])
     }
 }
 
-/// The distinct vertices of a few triangles. As in the leaf, lanes past the last vertex, and corners past the last
-/// triangle, repeat the first.
+/// The distinct vertices of a few triangles, one at least. As in the leaf, lanes past the last vertex repeat the first,
+/// and so do corners past the last triangle.
 ///
-/// They are kept as vectors, and changed as such: to write one lane and read all would stall.
+/// They are kept as vectors, and changed as such: to write one lane and read all would stall. Nor is there a branch on
+/// whether a vertex is known, which nobody foresees.
 #[derive(Clone, Copy)]
-pub(super) struct Filling {
-    /// By number: most that are shared are seen by it. Past the last vertex they are of no meaning.
-    numbers: u32x8,
-    positions: [f32x8; 3],
+pub(super) struct Filling<S: Simd> {
+    positions: [S::F32x8; 3],
     vertices: usize,
-    corners: [[u8; TriangleLeaf::MAX_TRIANGLES]; 3],
+    /// A byte a triangle, the first the lowest.
+    corners: [u64; 3],
     triangles: usize,
 }
 
-/// All bits of one lane.
-const ONE_LANE: [u32x8; MOST] = {
-    let mut masks = [u32x8::ZERO; MOST];
-    let mut lane = 0;
-    while lane < MOST {
-        let mut mask = [0; MOST];
-        mask[lane] = u32::MAX;
-        masks[lane] = u32x8::new(mask);
-        lane += 1;
-    }
-    masks
+/// From `8 + 7 - lane` on, all bits of that lane; of lane 8, none.
+static ONE_LANE: [f32; 2 * MOST + 7] = {
+    let mut lanes = [0.0; _];
+    lanes[2 * MOST - 1] = f32::from_bits(u32::MAX);
+    lanes
 };
 
-impl Filling {
-    pub const EMPTY: Self = Self {
-        numbers: u32x8::ZERO,
-        positions: [f32x8::ZERO; 3],
-        vertices: 0,
-        corners: [[0; _]; 3],
-        triangles: 0,
-    };
-
-    /// Forgets all.
+impl<S: Simd> Filling<S> {
+    /// Of one triangle, whose corners are three vertices.
     #[inline(always)]
-    pub fn clear(&mut self) {
-        self.vertices = 0;
-        self.triangles = 0;
-        self.corners = [[0; _]; 3];
+    pub fn of(token: S, corners: &Corners) -> Self {
+        let mut filling = Self::of_none(token, corners);
+        filling.put(token, &corners.0[1], 1);
+        filling.put(token, &corners.0[2], 2);
+        filling.corners = [0, 1, 2];
+        filling.vertices = 3;
+        filling
     }
 
-    /// Adds a triangle, if there is room for it.
+    /// Of one triangle that is never hit: all its corners are one vertex.
     #[inline(always)]
-    pub fn add(&mut self, corners: &Corners) -> bool {
-        if self.triangles == TriangleLeaf::MAX_TRIANGLES {
+    pub fn of_none(token: S, corners: &Corners) -> Self {
+        let [x, y, z, _] = corners.0[0];
+        Self {
+            positions: splat3(token, [x, y, z]),
+            vertices: 1,
+            corners: [0; 3],
+            triangles: 1,
+        }
+    }
+
+    /// Adds a triangle, whose corners are three vertices, if there is room for it.
+    #[inline(always)]
+    pub fn add(&mut self, token: S, corners: &Corners) -> bool {
+        let [a, b, c] = &corners.0;
+        let same = [
+            self.same(token, a),
+            self.same(token, b),
+            self.same(token, c),
+        ];
+        let [is_new_a, is_new_b, is_new_c] = [same[0] == 0, same[1] == 0, same[2] == 0];
+        let vertices = self.vertices;
+        let at_b = vertices + usize::from(is_new_a);
+        let at_c = at_b + usize::from(is_new_b);
+        let all = at_c + usize::from(is_new_c);
+        if all > MOST || self.triangles == TriangleLeaf::MAX_TRIANGLES {
             return false;
         }
-        let before = self.vertices;
-        let mut lanes = [0; 3];
-        for (corner, lane) in lanes.iter_mut().enumerate() {
-            let number = corners.numbers[corner];
-            let known = self.lane(number);
-            match known.or_else(|| self.lane_or_new(number, corners.positions[corner])) {
-                Some(known) => *lane = known as u8,
-                None => {
-                    self.forget(before);
-                    return false;
-                }
-            }
-        }
-        for (corners, lane) in self.corners.iter_mut().zip(lanes) {
-            corners[self.triangles] = lane;
-        }
+        self.put(token, a, if is_new_a { vertices } else { MOST });
+        self.put(token, b, if is_new_b { at_b } else { MOST });
+        self.put(token, c, if is_new_c { at_c } else { MOST });
+        let lane = |same: u32, new: usize| match same {
+            0 => new as u64,
+            _ => u64::from(same.trailing_zeros()),
+        };
+        let shift = 8 * self.triangles as u32;
+        self.corners[0] |= lane(same[0], vertices) << shift;
+        self.corners[1] |= lane(same[1], at_b) << shift;
+        self.corners[2] |= lane(same[2], at_c) << shift;
+        self.vertices = all;
         self.triangles += 1;
         true
     }
 
-    /// Adds a triangle that is never hit, if there is room for another: all its corners are one vertex.
-    pub fn add_none(&mut self, corners: &Corners) {
-        if self.triangles == TriangleLeaf::MAX_TRIANGLES {
-            return;
-        }
-        if self.vertices == 0 {
-            self.lane_or_new(corners.numbers[0], corners.positions[0]);
-        }
-        for corners in &mut self.corners {
-            corners[self.triangles] = 0;
-        }
-        self.triangles += 1;
+    /// Adds a triangle that is never hit, if there is room for another: all its corners are the first vertex.
+    pub fn add_none(&mut self) {
+        self.triangles = (self.triangles + 1).min(TriangleLeaf::MAX_TRIANGLES);
     }
 
-    /// The lanes that are in use.
+    /// The lanes that a vertex is in: one, or none. Those past the last repeat the first, whose lane is the lowest.
     #[inline(always)]
-    fn used(&self) -> u32 {
-        (1 << self.vertices) - 1
+    fn same(&self, token: S, &[x, y, z, _]: &[f32; 4]) -> u32 {
+        let [xs, ys, zs] = self.positions;
+        let [x, y, z] = splat3(token, [x, y, z]);
+        (xs.eq(x) & ys.eq(y) & zs.eq(z)).bits()
     }
 
-    /// Where a vertex is, by its number.
+    /// Puts a vertex in a lane, or in none if that is [`MOST`].
     #[inline(always)]
-    fn lane(&self, number: u32) -> Option<usize> {
-        let same = self.numbers.simd_eq(u32x8::splat(number));
-        let same = same.to_bitmask() & self.used();
-        (same != 0).then_some(same.trailing_zeros() as usize)
+    fn put(&mut self, token: S, &[x, y, z, _]: &[f32; 4], lane: usize) {
+        let mask = &ONE_LANE[2 * MOST - 1 - lane..];
+        let mask = S::F32x8::load(token, mask.first_chunk().unwrap_or(&[0.0; MOST]));
+        let [x, y, z] = splat3(token, [x, y, z]);
+        let [xs, ys, zs] = self.positions;
+        self.positions = [mask.select(x, xs), mask.select(y, ys), mask.select(z, zs)];
     }
 
-    /// Where a vertex is by its place, or is now, if there is room.
+    /// The leaf. Its primitive numbers begin at `first`.
     #[inline(always)]
-    fn lane_or_new(&mut self, number: u32, position: [f32; 3]) -> Option<usize> {
-        let [x, y, z] = position.map(f32x8::splat);
-        let [xs, ys, zs] = &mut self.positions;
-        let same = xs.simd_eq(x) & ys.simd_eq(y) & zs.simd_eq(z);
-        let same = same.to_bitmask() & ((1 << self.vertices) - 1);
-        if same != 0 {
-            return Some(same.trailing_zeros() as usize);
-        }
-        let lane = self.vertices;
-        let &mask = ONE_LANE.get(lane)?;
-        self.numbers = mask.bitselect(u32x8::splat(number), self.numbers);
-        // The first is repeated in all lanes.
-        let mask = if lane == 0 {
-            u32x8::splat(u32::MAX)
-        } else {
-            mask
-        };
-        let mask: f32x8 = bytemuck::cast(mask);
-        *xs = mask.bitselect(x, *xs);
-        *ys = mask.bitselect(y, *ys);
-        *zs = mask.bitselect(z, *zs);
-        self.vertices += 1;
-        Some(lane)
+    pub fn leaf(&self, first: u32) -> TriangleLeaf {
+        let [xs, ys, zs] = self.positions;
+        let vertices = [xs.to_array(), ys.to_array(), zs.to_array()];
+        let [a, b, c] = self.corners;
+        let corners = [a.to_le_bytes(), b.to_le_bytes(), c.to_le_bytes()];
+        TriangleLeaf::from_lanes(vertices, corners, first, self.triangles)
     }
-
-    /// Forgets the vertices from one on.
-    fn forget(&mut self, vertices: usize) {
-        self.vertices = vertices;
-        for lanes in &mut self.positions {
-            let mut array = lanes.to_array();
-            let first = array[0];
-            array[vertices..].fill(first);
-            *lanes = f32x8::new(array);
-        }
-    }
-
-    /// The box around all, of which there are some.
-    #[inline(always)]
-    pub fn aabb(&self) -> Aabb {
-        let [xs, ys, zs] = &self.positions;
-        let [x, y, z] = [range(*xs), range(*ys), range(*zs)];
-        Aabb::new(Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]))
-    }
-
-    /// The leaf, unless it is empty. Its primitive numbers begin at `first`.
-    #[inline(always)]
-    pub fn leaf(&self, first: u32) -> Option<TriangleLeaf> {
-        (self.triangles > 0).then(|| {
-            let [xs, ys, zs] = self.positions;
-            let vertices = [xs.to_array(), ys.to_array(), zs.to_array()];
-            TriangleLeaf::from_lanes(vertices, self.corners, first, self.triangles)
-        })
-    }
-}
-
-/// The least and the greatest of a few numbers, none of which is NaN. The sum turns -0.0 into 0.0, so that the order
-/// of joins never shows.
-#[inline(always)]
-fn range(lanes: f32x8) -> [f32; 2] {
-    let [a, b, c, d, e, f, g, h] = lanes.to_array();
-    let (low, high) = (f32x4::new([a, b, c, d]), f32x4::new([e, f, g, h]));
-    let [a, b, c, d] = low.fast_min(high).to_array();
-    let [e, f, g, h] = low.fast_max(high).to_array();
-    let least = |a: f32, b: f32| if b < a { b } else { a };
-    let greatest = |a: f32, b: f32| if b > a { b } else { a };
-    [
-        least(least(a, b), least(c, d)) + 0.0,
-        greatest(greatest(e, f), greatest(g, h)) + 0.0,
-    ]
 }

@@ -9,11 +9,11 @@ use super::{
     collapse::{Collapse, MAX_WIDTH},
     cost::Measure,
     emit::Shape,
-    input::Input,
+    input::{Input, leaf_of},
     lay_out::{Part, below_inner, lay_out},
     monitor::Watch,
 };
-use crate::geometry::Aabb;
+use crate::{geometry::Aabb, simd::Backend};
 use core::ops::ControlFlow;
 use std::{vec, vec::Vec};
 
@@ -174,6 +174,7 @@ fn groups<I: Input, const W: usize>(
 /// Joins leaves, the best pair first, for as long as it is worth it: those that are left.
 fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group]) -> &'a [Group] {
     const { assert!(I::MAX_LEAF <= MAX_LEAF) };
+    let backend = Backend::detect();
     let cost = |aabb: &Aabb, len: usize| measure.half_area(aabb) * I::leaf_cost(len);
     let mut len = leaves.len();
     // Pairs for which there is no room in one leaf.
@@ -192,7 +193,7 @@ fn join_pairs<'a, I: Input>(input: &I, measure: &Measure, leaves: &'a mut [Group
                 let gain = apart * I::JOINED - joined;
                 if gain > best {
                     let joined = a.join(b);
-                    if input.fits(joined.ids()) {
+                    if leaf_of(backend, input, joined.ids(), 0).is_some() {
                         best = gain;
                         pair = Some((first, second, joined));
                     } else {

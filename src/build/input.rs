@@ -4,18 +4,21 @@
 use super::{
     BuildError, cost,
     fill::{Corners, Filling},
+    refs::Bounds,
 };
 use crate::{
-    geometry::{Aabb, TriangleMesh, is_degenerate},
+    geometry::{Aabb, TriangleMesh, has_area, is_degenerate},
     layout::{Leaf, PrimitiveLeaf, TriangleLeaf},
+    simd::{Backend, Operation, Simd},
 };
 use glam::{Vec3, Vec3A};
+use wide::f32x4;
 
 /// Whether a primitive has a place in the tree.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) enum Verdict {
     /// Yes, in this box.
-    Keep(Aabb),
+    Keep(Bounds),
     /// No: no ray hits a triangle without area or what has no points.
     Unhittable,
     /// No, if the caller wants such ones left out; else an error.
@@ -27,14 +30,12 @@ pub(super) enum Verdict {
 /// Primitives, by number, and the leaves they go into.
 pub(super) trait Input: Sync {
     type Leaf: Leaf + Send;
-    /// A leaf while it is filled.
-    type Filling: Copy + Send;
+    /// A leaf while it is filled, in a backend's vectors.
+    type Filling<S: Simd>: Copy;
     /// What a leaf has of a primitive.
     type Loaded: Copy;
     /// That of no primitive.
     const UNLOADED: Self::Loaded;
-    /// One without primitives.
-    const EMPTY: Self::Filling;
     /// The most primitives a leaf has.
     const MAX_LEAF: usize;
     /// How many times the cost of two leaves one may have for which they are given up.
@@ -52,29 +53,69 @@ pub(super) trait Input: Sync {
     fn triangle(&self, id: u32) -> Option<[Vec3; 3]>;
     /// The primitive that a number in a tree stands for.
     fn primitive(&self, number: u32) -> u32;
-    /// Empties a leaf.
-    fn clear(filling: &mut Self::Filling);
+    /// A finite box around all that are kept; not the least.
+    fn around(&self) -> Bounds;
     /// What a leaf has of a primitive.
     fn load(&self, id: u32) -> Self::Loaded;
-    /// Adds a primitive to a leaf, if it fits.
-    fn add_loaded(filling: &mut Self::Filling, loaded: &Self::Loaded) -> bool;
-    /// Adds a primitive to a leaf, if it fits.
-    #[inline(always)]
-    fn add(&self, filling: &mut Self::Filling, id: u32) -> bool {
-        Self::add_loaded(filling, &self.load(id))
-    }
-    /// Whether these primitives can be one leaf.
-    #[inline]
-    fn fits(&self, ids: &[u32]) -> bool {
-        let mut filling = Self::EMPTY;
-        ids.iter().all(|&id| self.add(&mut filling, id))
-    }
+    /// The box around it, but for the sign of zeros.
+    fn bounds(loaded: &Self::Loaded) -> Bounds;
+    /// A leaf of one primitive that is kept.
+    fn begin<S: Simd>(token: S, loaded: &Self::Loaded) -> Self::Filling<S>;
+    /// Adds a primitive that is kept to a leaf, if it fits.
+    fn add<S: Simd>(token: S, filling: &mut Self::Filling<S>, loaded: &Self::Loaded) -> bool;
     /// The cost of a leaf of `count`.
     fn leaf_cost(count: usize) -> f32;
-    /// The box around the primitives of a leaf, of which there are some.
-    fn aabb_of(filling: &Self::Filling) -> Aabb;
-    /// The leaf, unless it is empty, of the primitives whose numbers begin at `first` in the list.
-    fn leaf(filling: &Self::Filling, first: u32) -> Option<Self::Leaf>;
+    /// The leaf of the primitives whose numbers begin at `first` in the list.
+    fn leaf<S: Simd>(filling: &Self::Filling<S>, first: u32) -> Self::Leaf;
+}
+
+/// The leaf of a few primitives that are kept, whose numbers begin at `first` in the list, if they fit into one and are
+/// some.
+pub(super) fn leaf_of<I: Input>(
+    backend: Backend,
+    input: &I,
+    ids: &[u32],
+    first: u32,
+) -> Option<I::Leaf> {
+    backend.run(LeafOf { input, ids, first })
+}
+
+struct LeafOf<'a, I> {
+    input: &'a I,
+    ids: &'a [u32],
+    first: u32,
+}
+
+impl<I: Input> Operation for LeafOf<'_, I> {
+    type Output = Option<I::Leaf>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) -> Option<I::Leaf> {
+        let (&first, rest) = self.ids.split_first()?;
+        let mut filling = I::begin(token, &self.input.load(first));
+        for &id in rest {
+            if !I::add(token, &mut filling, &self.input.load(id)) {
+                return None;
+            }
+        }
+        Some(I::leaf(&filling, self.first))
+    }
+}
+
+/// The box around all points that are finite; one point if there are none.
+fn around(points: impl Iterator<Item = Vec3>) -> Bounds {
+    let mut around = Bounds::EMPTY;
+    for point in points {
+        let point = Vec3A::from(point);
+        if point.is_finite() {
+            let [x, y, z] = point.to_array();
+            around = around.join_point(f32x4::new([x, y, z, 0.0]));
+        }
+    }
+    match around.min.to_array()[0] > around.max.to_array()[0] {
+        true => Bounds::EMPTY.join_point(f32x4::ZERO),
+        false => around,
+    }
 }
 
 /// The triangles of a mesh.
@@ -93,6 +134,21 @@ impl Triangles<'_> {
     }
 }
 
+impl Triangles<'_> {
+    /// The first corner that is not finite.
+    #[cold]
+    fn non_finite(&self, id: u32) -> Option<BuildError> {
+        let corners = self.corners(id);
+        let corner = corners.iter().position(|corner| !corner.is_finite())?;
+        Some(BuildError::NonFinitePosition {
+            triangle: id as usize,
+            corner,
+            vertex: self.0.indices()[id as usize][corner],
+            position: corners[corner],
+        })
+    }
+}
+
 /// The box around a triangle. The sum turns -0.0 into 0.0, so that the order of joins never shows.
 #[inline(always)]
 fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
@@ -103,10 +159,9 @@ fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
 
 impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
-    type Filling = Filling;
+    type Filling<S: Simd> = Filling<S>;
     type Loaded = Corners;
     const UNLOADED: Corners = Corners::NONE;
-    const EMPTY: Filling = Filling::EMPTY;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
     const JOINED: f32 = cost::TRIANGLES_JOINED;
     const CAN_SPLIT: bool = true;
@@ -115,23 +170,27 @@ impl Input for Triangles<'_> {
         self.0.len()
     }
 
-    #[inline]
+    #[inline(always)]
     fn verdict(&self, id: u32) -> Verdict {
-        let corners = self.corners(id);
-        let [a, b, c] = corners.map(Vec3A::from);
-        let is_finite = a.is_finite() && b.is_finite() && c.is_finite();
-        if !is_finite && let Some(corner) = corners.iter().position(|corner| !corner.is_finite()) {
-            return Verdict::NonFinite(BuildError::NonFinitePosition {
-                triangle: id as usize,
-                corner,
-                vertex: self.0.indices()[id as usize][corner],
-                position: corners[corner],
-            });
+        let loaded = self.load(id);
+        let Corners([a, b, c]) = loaded;
+        let [a, b, c] = [f32x4::new(a), f32x4::new(b), f32x4::new(c)];
+        // 0 times what is not finite is NaN.
+        let zero = f32x4::ZERO;
+        let is_finite = (a * zero + b * zero + c * zero).simd_eq(zero).to_bitmask() == 15;
+        if !is_finite && let Some(error) = self.non_finite(id) {
+            return Verdict::NonFinite(error);
         }
-        if is_degenerate(corners) {
+        let vectors = [a, b, c].map(|v| Vec3A::from_vec4(v.to_array().into()));
+        if !has_area(vectors) && is_degenerate(self.corners(id)) {
             return Verdict::Unhittable;
         }
-        Verdict::Keep(triangle_aabb(corners))
+        // The sum turns -0.0 into 0.0, so that the order of joins never shows.
+        let Bounds { min, max } = Self::bounds(&loaded);
+        Verdict::Keep(Bounds {
+            min: min + zero,
+            max: max + zero,
+        })
     }
 
     #[inline]
@@ -149,9 +208,8 @@ impl Input for Triangles<'_> {
         number
     }
 
-    #[inline(always)]
-    fn clear(filling: &mut Filling) {
-        filling.clear();
+    fn around(&self) -> Bounds {
+        around(self.0.positions().iter().map(|&p| Vec3::from_array(p)))
     }
 
     #[inline(always)]
@@ -160,8 +218,22 @@ impl Input for Triangles<'_> {
     }
 
     #[inline(always)]
-    fn add_loaded(filling: &mut Filling, corners: &Corners) -> bool {
-        filling.add(corners)
+    fn bounds(&Corners([a, b, c]): &Corners) -> Bounds {
+        let [a, b, c] = [f32x4::new(a), f32x4::new(b), f32x4::new(c)];
+        Bounds {
+            min: a.fast_min(b).fast_min(c),
+            max: a.fast_max(b).fast_max(c),
+        }
+    }
+
+    #[inline(always)]
+    fn begin<S: Simd>(token: S, corners: &Corners) -> Filling<S> {
+        Filling::of(token, corners)
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(token: S, filling: &mut Filling<S>, corners: &Corners) -> bool {
+        filling.add(token, corners)
     }
 
     #[inline]
@@ -170,12 +242,7 @@ impl Input for Triangles<'_> {
     }
 
     #[inline(always)]
-    fn aabb_of(filling: &Filling) -> Aabb {
-        filling.aabb()
-    }
-
-    #[inline(always)]
-    fn leaf(filling: &Filling, first: u32) -> Option<TriangleLeaf> {
+    fn leaf<S: Simd>(filling: &Filling<S>, first: u32) -> TriangleLeaf {
         filling.leaf(first)
     }
 }
@@ -186,11 +253,10 @@ pub(super) struct Boxes<'a>(pub &'a [Aabb]);
 
 impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
-    /// How many there are, and the box around them.
-    type Filling = (usize, Aabb);
+    /// How many there are.
+    type Filling<S: Simd> = usize;
     type Loaded = Aabb;
     const UNLOADED: Aabb = Aabb::EMPTY;
-    const EMPTY: Self::Filling = (0, Aabb::EMPTY);
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
     const JOINED: f32 = 1.0;
     const CAN_SPLIT: bool = false;
@@ -207,7 +273,7 @@ impl Input for Boxes<'_> {
             () if aabb == Aabb::EMPTY => Verdict::Unhittable,
             () if !aabb.is_finite() => Verdict::NonFinite(BuildError::NonFiniteBox { primitive }),
             () if aabb.is_empty() => Verdict::Invalid(BuildError::InvalidBox { primitive }),
-            () => Verdict::Keep(self.aabb(id)),
+            () => Verdict::Keep(Bounds::of(&self.aabb(id))),
         }
     }
 
@@ -226,28 +292,31 @@ impl Input for Boxes<'_> {
         number
     }
 
-    #[inline]
-    fn clear(filling: &mut Self::Filling) {
-        *filling = Self::EMPTY;
+    fn around(&self) -> Bounds {
+        let kept = self.0.iter().filter(|aabb| !aabb.is_empty());
+        around(kept.flat_map(|aabb| [aabb.min, aabb.max]))
     }
 
-    #[inline]
+    #[inline(always)]
     fn load(&self, id: u32) -> Aabb {
         self.aabb(id)
     }
 
-    #[inline]
-    fn add_loaded((count, aabb): &mut Self::Filling, own: &Aabb) -> bool {
-        let fits = *count < Self::MAX_LEAF;
-        if fits {
-            *count += 1;
-            *aabb = aabb.join(*own);
-        }
-        fits
+    #[inline(always)]
+    fn bounds(aabb: &Aabb) -> Bounds {
+        Bounds::of(aabb)
     }
 
-    fn aabb_of(&(_, aabb): &Self::Filling) -> Aabb {
-        aabb
+    #[inline(always)]
+    fn begin<S: Simd>(_: S, _: &Aabb) -> usize {
+        1
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(_: S, count: &mut usize, _: &Aabb) -> bool {
+        let fits = *count < Self::MAX_LEAF;
+        *count += usize::from(fits);
+        fits
     }
 
     #[inline]
@@ -255,8 +324,8 @@ impl Input for Boxes<'_> {
         cost::PRIMITIVE_LEAF + cost::PRIMITIVE * count as f32
     }
 
-    fn leaf(&(count, _): &Self::Filling, first: u32) -> Option<PrimitiveLeaf> {
-        (count > 0).then(|| PrimitiveLeaf::new(first, count as u32))
+    fn leaf<S: Simd>(&count: &usize, first: u32) -> PrimitiveLeaf {
+        PrimitiveLeaf::new(first, count as u32)
     }
 }
 
@@ -266,10 +335,10 @@ pub(super) struct TrianglesInRuns<'a>(pub &'a TriangleMesh<'a>);
 
 impl Input for TrianglesInRuns<'_> {
     type Leaf = PrimitiveLeaf;
-    type Filling = (usize, Aabb);
+    /// How many there are.
+    type Filling<S: Simd> = usize;
     type Loaded = Aabb;
     const UNLOADED: Aabb = Aabb::EMPTY;
-    const EMPTY: Self::Filling = Boxes::EMPTY;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
     const JOINED: f32 = cost::RUNS_JOINED;
     const CAN_SPLIT: bool = true;
@@ -298,23 +367,28 @@ impl Input for TrianglesInRuns<'_> {
         number
     }
 
-    #[inline]
-    fn clear(filling: &mut Self::Filling) {
-        Boxes::clear(filling);
+    fn around(&self) -> Bounds {
+        Triangles(self.0).around()
     }
 
-    #[inline]
+    #[inline(always)]
     fn load(&self, id: u32) -> Aabb {
         self.aabb(id)
     }
 
-    #[inline]
-    fn add_loaded(filling: &mut Self::Filling, own: &Aabb) -> bool {
-        Boxes::add_loaded(filling, own)
+    #[inline(always)]
+    fn bounds(aabb: &Aabb) -> Bounds {
+        Boxes::bounds(aabb)
     }
 
-    fn aabb_of(filling: &Self::Filling) -> Aabb {
-        Boxes::aabb_of(filling)
+    #[inline(always)]
+    fn begin<S: Simd>(token: S, aabb: &Aabb) -> usize {
+        Boxes::begin(token, aabb)
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(token: S, count: &mut usize, aabb: &Aabb) -> bool {
+        Boxes::add(token, count, aabb)
     }
 
     #[inline]
@@ -322,7 +396,7 @@ impl Input for TrianglesInRuns<'_> {
         cost::RUN_LEAF + cost::RUN_TRIANGLE * count as f32
     }
 
-    fn leaf(filling: &Self::Filling, first: u32) -> Option<PrimitiveLeaf> {
-        Boxes::leaf(filling, first)
+    fn leaf<S: Simd>(count: &usize, first: u32) -> PrimitiveLeaf {
+        Boxes::leaf::<S>(count, first)
     }
 }

@@ -1,7 +1,10 @@
 //! Triangles in pieces, as what a tree is built over: numbers past those of the primitives are pieces of them.
 
-use super::input::{Input, Verdict};
-use crate::geometry::Aabb;
+use super::{
+    input::{Input, Verdict},
+    refs::Bounds,
+};
+use crate::{geometry::Aabb, simd::Simd};
 use glam::Vec3;
 use std::vec::Vec;
 
@@ -44,10 +47,9 @@ impl<'a, I: Input> Pieces<'a, I> {
 
 impl<I: Input> Input for Pieces<'_, I> {
     type Leaf = I::Leaf;
-    type Filling = I::Filling;
+    type Filling<S: Simd> = I::Filling<S>;
     type Loaded = I::Loaded;
     const UNLOADED: I::Loaded = I::UNLOADED;
-    const EMPTY: I::Filling = I::EMPTY;
     const MAX_LEAF: usize = I::MAX_LEAF;
     const JOINED: f32 = I::JOINED;
     const CAN_SPLIT: bool = false;
@@ -77,9 +79,8 @@ impl<I: Input> Input for Pieces<'_, I> {
         self.piece(number).map_or(number, |piece| piece.id)
     }
 
-    #[inline(always)]
-    fn clear(filling: &mut I::Filling) {
-        I::clear(filling);
+    fn around(&self) -> Bounds {
+        self.input.around()
     }
 
     #[inline(always)]
@@ -88,19 +89,26 @@ impl<I: Input> Input for Pieces<'_, I> {
     }
 
     #[inline(always)]
-    fn add_loaded(filling: &mut I::Filling, loaded: &I::Loaded) -> bool {
-        I::add_loaded(filling, loaded)
+    fn bounds(loaded: &I::Loaded) -> Bounds {
+        I::bounds(loaded)
+    }
+
+    #[inline(always)]
+    fn begin<S: Simd>(token: S, loaded: &I::Loaded) -> I::Filling<S> {
+        I::begin(token, loaded)
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(token: S, filling: &mut I::Filling<S>, loaded: &I::Loaded) -> bool {
+        I::add(token, filling, loaded)
     }
 
     fn leaf_cost(count: usize) -> f32 {
         I::leaf_cost(count)
     }
 
-    fn aabb_of(filling: &I::Filling) -> Aabb {
-        I::aabb_of(filling)
-    }
-
-    fn leaf(filling: &I::Filling, first: u32) -> Option<I::Leaf> {
+    #[inline(always)]
+    fn leaf<S: Simd>(filling: &I::Filling<S>, first: u32) -> I::Leaf {
         I::leaf(filling, first)
     }
 }

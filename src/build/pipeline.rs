@@ -44,23 +44,28 @@ const QUICK: Effort = Effort {
     least_gain: 1e-2,
 };
 
-/// A hierarchy over `refs`.
+/// What a caller wants of a build.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wants {
+    pub preset: Preset,
+    pub drop_non_finite: bool,
+    pub splits: f32,
+}
+
+/// A hierarchy over all primitives that have a place in it.
 ///
 /// # Errors
-/// The build was cancelled.
-pub(super) fn from_refs<N: WideNode, I: Input>(
+/// The first primitive that is not finite, unless those are left out, or too many; or the build was cancelled.
+pub(super) fn build<N: WideNode, I: Input>(
     input: &I,
-    refs: Refs,
-    preset: Preset,
-    splits: f32,
+    wants: Wants,
     watch: &Watch,
 ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
-    let dropped = refs.dropped;
-    let parts = match N::WIDTH {
-        4 => preset_parts::<N, I, 4>(input, refs, preset, splits, watch),
-        _ => preset_parts::<N, I, 8>(input, refs, preset, splits, watch),
-    };
-    finish(parts?, dropped, watch)
+    let (parts, dropped) = match N::WIDTH {
+        4 => preset_parts::<N, I, 4>(input, wants, watch),
+        _ => preset_parts::<N, I, 8>(input, wants, watch),
+    }?;
+    finish(parts, dropped, watch)
 }
 
 /// A hierarchy from a caller's tree.
@@ -111,27 +116,34 @@ fn finish<N: WideNode, L: Leaf>(
         primitives,
         bounds,
     } = parts;
-    let bvh = Bvh::from_parts(nodes, leaves, primitives, bounds)?;
+    // What the check looks for: `walk` gives out places in the layout's order and has seen that the stack does; leaves
+    // are filled from `primitives`, in their order, and boxes are joins of finite ones.
+    let bvh = Bvh::from_emitted(nodes, leaves, primitives, bounds)?;
     watch.finish()?;
     Ok(bvh.with_dropped(dropped as u32))
 }
 
-/// What is in a hierarchy over `refs`.
+/// What is in a hierarchy, and how many primitives were left out for not being finite.
 fn preset_parts<N: WideNode, I: Input, const W: usize>(
     input: &I,
-    refs: Refs,
-    preset: Preset,
-    splits: f32,
+    wants: Wants,
     watch: &Watch,
-) -> Result<Parts<N, I::Leaf>, BuildError> {
-    match preset {
-        Preset::Fast => match fast::build::<N, I, W>(input, &refs, watch) {
-            Err(BuildError::Layout(LayoutError::TooDeep(_))) => {
-                preset_parts::<N, I, W>(input, refs, Preset::Balanced, splits, watch)
-            }
-            parts => parts,
-        },
-        Preset::Balanced => {
+) -> Result<(Parts<N, I::Leaf>, usize), BuildError> {
+    let Wants {
+        preset,
+        drop_non_finite,
+        splits,
+    } = wants;
+    if let Preset::Fast = preset {
+        let built = fast::build::<N, I, W>(input, drop_non_finite, watch);
+        let Err(BuildError::Layout(LayoutError::TooDeep(_))) = built else {
+            return built;
+        };
+    }
+    let refs = Refs::gather(input, drop_non_finite, watch)?;
+    let dropped = refs.dropped;
+    let parts = match preset {
+        Preset::Fast | Preset::Balanced => {
             let (tree, pieces) = spatial::build(input, refs, splits, Leaves::FULL, watch)?;
             let tree = reinsertion::optimize(tree, QUICK, 0.75, watch)?;
             collapsed::<N, _, W>(&pieces, &tree, watch)
@@ -144,7 +156,8 @@ fn preset_parts<N: WideNode, I: Input, const W: usize>(
             let tree = reinsertion::optimize(tree, GROUPED, 0.9, watch)?;
             collapsed::<N, _, W>(&pieces, &tree, watch)
         }
-    }
+    };
+    Ok((parts?, dropped))
 }
 
 /// The tree over the leaves that it would be collapsed to, joined. `leaves` is what it was built with.

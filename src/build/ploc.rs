@@ -2,298 +2,314 @@
 //!
 //! Meister and Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy construction" (2018).
 
-use super::{binary::BinaryNode, monitor::Watch};
-use crate::geometry::Aabb;
+use super::monitor::Watch;
+use crate::{
+    geometry::Aabb,
+    simd::{Backend, Lanes, Operation, Simd, Vector, splat3},
+};
 use std::{vec, vec::Vec};
-use wide::{f32x4, u32x4};
 
-/// How far along the curve a cluster looks to either side. A multiple of 4.
-const RADIUS: usize = 4;
-const SLOTS: usize = 2 * RADIUS;
+/// How far along the curve a cluster looks to either side: as far as eight lanes go, in the middle of which it is
+/// itself.
+const RADIUS: usize = 3;
+const SLOTS: usize = 8;
 /// The bits that tell them apart.
-const SLOT: u32 = SLOTS.next_power_of_two() as u32 - 1;
-/// One of so many clusters of a part is left for those of other parts to be joined with.
-const LEFT: usize = 16;
+const SLOT: u32 = SLOTS as u32 - 1;
+/// All but its own and the last, which has no partner on the other side.
+const OTHERS: u32 = 0b0111_0111;
 
-/// Clusters along the curve.
-struct Clusters {
-    /// Their boxes, by side and axis, scaled by the scene's measure. Before the first and after the last are
-    /// [`RADIUS`] that are far too large for anyone.
-    planes: [Vec<f32>; 6],
-    nodes: Vec<BinaryNode>,
-    scale: f32,
+/// A node of the tree, after those below it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub aabb: Aabb,
+    /// A leaf's number, or the place of the first child.
+    first: u32,
+    /// How many primitives a leaf has, or the place of the second child and [`Self::INNER`].
+    second: u32,
 }
 
-/// Beyond any scene, whose coordinates are less than 4; its area is still finite.
-const FAR: f32 = 1e18;
+impl Node {
+    const INNER: u32 = 1 << 31;
 
-impl Clusters {
-    fn new(nodes: Vec<BinaryNode>, scale: f32) -> Self {
-        let planes = [0; 6].map(|_| vec![0.0; nodes.len() + SLOTS]);
-        let mut clusters = Self {
-            planes,
-            nodes,
-            scale,
-        };
-        clusters.look();
-        clusters
-    }
-
-    /// Makes the planes those of the nodes.
-    fn look(&mut self) {
-        let Self {
-            planes,
-            nodes,
-            scale,
-        } = self;
-        let end = nodes.len() + RADIUS;
-        for (side, planes) in planes.iter_mut().enumerate() {
-            let far = if side < 3 { -FAR } else { FAR };
-            planes.truncate(end + RADIUS);
-            planes[..RADIUS].fill(far);
-            planes[end..].fill(far);
-        }
-        let mut planes = planes
-            .each_mut()
-            .map(|planes| planes[RADIUS..end].iter_mut());
-        for node in nodes {
-            let Aabb { min, max } = node.aabb;
-            let sides = [min.x, min.y, min.z, max.x, max.y, max.z];
-            for (planes, x) in planes.iter_mut().zip(sides) {
-                if let Some(plane) = planes.next() {
-                    *plane = x * *scale;
-                }
-            }
-        }
-    }
-
-    /// Joins clusters until there are no more than `until`. Each pair that is joined goes to the end of `pairs`; its
-    /// place there, from `base` on, is the new node's `first`.
-    fn join(&mut self, until: usize, pairs: &mut Vec<[BinaryNode; 2]>, base: u32, watch: &Watch) {
-        let (mut nearest, mut kept) = (Vec::new(), Vec::new());
-        while self.nodes.len() > until.max(1) {
-            let count = self.nodes.len();
-            self.search(&mut nearest);
-            let left = self.join_pairs(&nearest, &mut kept, pairs, base);
-            // Clusters that all like the one before better than the one after are joined one a round. Then it
-            // is halves.
-            if left > count - count / 16 {
-                nearest.clear();
-                nearest.extend((0..left as u32).map(|place| (place ^ 1).min(left as u32 - 1)));
-                self.join_pairs(&nearest, &mut kept, pairs, base);
-            }
-            if !watch.advance(count - self.nodes.len()) {
-                return;
-            }
-        }
-    }
-
-    /// The place of the best partner of each.
-    fn search(&self, nearest: &mut Vec<u32>) {
-        #[cfg(feature = "rayon")]
-        if self.nodes.len() > 4 * super::parallel::TASK {
-            use rayon::prelude::*;
-            (0..self.nodes.len())
-                .into_par_iter()
-                .with_min_len(super::parallel::TASK)
-                .map(|place| self.nearest(place))
-                .collect_into_vec(nearest);
-            return;
-        }
-        nearest.clear();
-        nearest.extend((0..self.nodes.len()).map(|place| self.nearest(place)));
-    }
-
-    /// The cluster with which the box is least; of equals the first.
-    ///
-    /// Areas are compared together with the place, which takes the last bits. So the order is one of pairs, the same
-    /// seen from both sides: the least pair is always joined.
     #[inline(always)]
-    fn nearest(&self, place: usize) -> u32 {
-        const AROUND: [f32; SLOTS + 1] = [0.0; _];
-        let [x0, y0, z0, x1, y1, z1] = &self.planes;
-        let at = |planes: &'_ Vec<f32>| *planes[place..].first_chunk().unwrap_or(&AROUND);
-        let planes = [at(x0), at(y0), at(z0), at(x1), at(y1), at(z1)];
-        let own = |side: usize| f32x4::splat(planes[side][RADIUS]);
-        let [x0, y0, z0, x1, y1, z1] = [own(0), own(1), own(2), own(3), own(4), own(5)];
-        // As integers, which are ordered as numbers that are not negative are: a denormal is not to be flushed to zero.
-        let mut best = u32x4::splat(u32::MAX);
-        for block in 0..SLOTS / 4 {
-            // Its own place is left out.
-            let start = 4 * block + usize::from(4 * block >= RADIUS);
-            let load = |side: usize| {
-                let lanes = &planes[side];
-                f32x4::new([
-                    lanes[start],
-                    lanes[start + 1],
-                    lanes[start + 2],
-                    lanes[start + 3],
-                ])
-            };
-            let x = x1.fast_max(load(3)) - x0.fast_min(load(0));
-            let y = y1.fast_max(load(4)) - y0.fast_min(load(1));
-            let z = z1.fast_max(load(5)) - z0.fast_min(load(2));
-            let area = x * y + (x + y) * z;
-            let first = 4 * block as u32;
-            let slots = u32x4::new([first, first + 1, first + 2, first + 3]);
-            let area: u32x4 = bytemuck::cast(area);
-            best = best.min((area & u32x4::splat(!SLOT)) | slots);
-        }
-        let [a, b, c, d] = best.to_array();
-        let slot = (a.min(b).min(c.min(d)) & SLOT) as usize;
-        (place + slot + usize::from(slot >= RADIUS) - RADIUS) as u32
-    }
-
-    /// Joins those that are each other's nearest: how many are left.
-    fn join_pairs(
-        &mut self,
-        nearest: &[u32],
-        kept: &mut Vec<[u32; 2]>,
-        pairs: &mut Vec<[BinaryNode; 2]>,
-        base: u32,
-    ) -> usize {
-        kept.clear();
-        for (place, &other) in nearest.iter().enumerate() {
-            let place = place as u32;
-            let mutual = nearest[other as usize] == place;
-            if mutual && other < place {
-                continue;
-            }
-            kept.push([place, if mutual { other } else { place }]);
-        }
-        for (end, &[place, other]) in kept.iter().enumerate() {
-            let mut node = self.nodes[place as usize];
-            if other != place {
-                let pair = [node, self.nodes[other as usize]];
-                node = BinaryNode {
-                    aabb: pair[0].aabb.join(pair[1].aabb),
-                    first: base + pairs.len() as u32,
-                    count: 0,
-                };
-                pairs.push(pair);
-            }
-            self.nodes[end] = node;
-        }
-        self.nodes.truncate(kept.len());
-        self.look();
-        kept.len()
-    }
-}
-
-/// What is joined apart from the rest, so that it is on one core, and in its cache.
-pub(super) struct Part {
-    pairs: Vec<[BinaryNode; 2]>,
-    roots: Vec<BinaryNode>,
-}
-
-impl Part {
-    /// Joins all but one of so many.
-    pub fn new(leaves: Vec<BinaryNode>, scale: f32, watch: &Watch) -> Self {
-        let until = leaves.len() / LEFT;
-        let mut pairs = Vec::with_capacity(leaves.len());
-        let mut clusters = Clusters::new(leaves, scale);
-        clusters.join(until, &mut pairs, 0, watch);
+    pub const fn leaf(aabb: Aabb, number: u32, count: u32) -> Self {
         Self {
-            pairs,
-            roots: clusters.nodes,
+            aabb,
+            first: number,
+            second: count,
         }
     }
 
-    fn leaves(&self) -> usize {
-        self.pairs.len() + self.roots.len()
+    #[inline(always)]
+    pub const fn is_leaf(&self) -> bool {
+        self.second & Self::INNER == 0
     }
-}
 
-/// The tree over parts, with all children after their parents.
-pub(super) fn tree(parts: &[Part], scale: f32, watch: &Watch) -> Vec<BinaryNode> {
-    let leaves: usize = parts.iter().map(Part::leaves).sum();
-    if leaves == 0 {
-        return Vec::new();
+    /// A leaf's number.
+    #[inline(always)]
+    pub const fn number(&self) -> usize {
+        self.first as usize
     }
-    let mut bases = Vec::with_capacity(parts.len());
-    let mut pairs = 0;
-    let mut roots = Vec::new();
-    for part in parts {
-        let base = Base(pairs);
-        roots.extend(part.roots.iter().map(|&root| base.raise(root)));
-        bases.push(base);
-        pairs += part.pairs.len() as u32;
+
+    /// How many primitives a leaf has.
+    #[inline(always)]
+    pub const fn count(&self) -> usize {
+        self.second as usize
     }
-    let mut top = Vec::with_capacity(roots.len());
-    let mut clusters = Clusters::new(roots, scale);
-    clusters.join(1, &mut top, pairs, watch);
 
-    // The later a pair was made, the closer it is to the root.
-    let mut nodes = Vec::with_capacity(2 * leaves - 1);
-    let place = |node: BinaryNode| match node.is_leaf() {
-        true => node,
-        false => BinaryNode {
-            first: 2 * (leaves as u32 - 2 - node.first) + 1,
-            ..node
-        },
-    };
-    nodes.extend(clusters.nodes.into_iter().take(1).map(place));
-    nodes.extend(top.into_iter().rev().flatten().map(place));
-    for (part, base) in parts.iter().zip(&bases).rev() {
-        let pairs = part.pairs.iter().rev().flatten();
-        nodes.extend(pairs.map(|&node| place(base.raise(node))));
+    /// The two children, if it is no leaf.
+    #[inline(always)]
+    pub const fn children(&self) -> [usize; 2] {
+        [self.first as usize, (self.second & !Self::INNER) as usize]
     }
-    nodes
-}
 
-/// How many pairs come before those of a part.
-struct Base(u32);
-
-impl Base {
-    #[inline]
-    fn raise(&self, node: BinaryNode) -> BinaryNode {
-        match node.is_leaf() {
-            true => node,
-            false => BinaryNode {
-                first: self.0 + node.first,
-                ..node
+    /// The same after so many other leaves and nodes.
+    #[inline(always)]
+    pub const fn after(&self, leaves: u32, nodes: u32) -> Self {
+        match self.is_leaf() {
+            true => Self {
+                first: self.first + leaves,
+                ..*self
+            },
+            false => Self {
+                first: self.first + nodes,
+                second: self.second + nodes,
+                ..*self
             },
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::build::BinaryTree;
-    use glam::Vec3;
+/// Beyond any scene, whose coordinates are less than 4; its area is still finite.
+const FAR: f32 = 1e18;
 
-    fn leaf(number: u32, aabb: Aabb) -> BinaryNode {
-        BinaryNode {
-            aabb,
-            first: number,
-            count: 1,
+/// Joins clusters, which are nodes that follow each other along the curve, until there are no more than `until`: those
+/// that are left. New nodes go to the end.
+pub(super) fn join(
+    nodes: &mut Vec<Node>,
+    clusters: Vec<u32>,
+    until: usize,
+    scale: f32,
+    watch: &Watch,
+) -> Vec<u32> {
+    let backend = Backend::detect();
+    let mut nearest = vec![0; clusters.len()];
+    let mut clusters = Clusters::new(nodes, clusters, scale);
+    while clusters.places.len() > until.max(1) {
+        let count = clusters.places.len();
+        clusters.search(backend, &mut nearest[..count]);
+        let left = clusters.join_pairs(nodes, &nearest[..count]);
+        // Clusters that all like the one before better than the one after are joined one a round. Then it
+        // is halves.
+        if left > count - count / 16 {
+            let halves = &mut nearest[..left];
+            for (other, place) in halves.iter_mut().zip(0u32..) {
+                *other = (place ^ 1).min(left as u32 - 1);
+            }
+            clusters.join_pairs(nodes, halves);
+        }
+        if !watch.advance(count - clusters.places.len()) {
+            break;
+        }
+    }
+    clusters.places
+}
+
+/// Clusters along the curve.
+struct Clusters {
+    /// Their boxes, by side and axis, scaled by the scene's measure. Around each are [`SLOTS`], of which those before the
+    /// first and after the last are far too large for anyone.
+    planes: [Vec<f32>; 6],
+    /// Their places among the nodes.
+    places: Vec<u32>,
+    scale: f32,
+}
+
+impl Clusters {
+    fn new(nodes: &[Node], places: Vec<u32>, scale: f32) -> Self {
+        let mut planes = [-FAR, -FAR, -FAR, FAR, FAR, FAR].map(|far| {
+            let mut planes = Vec::with_capacity(places.len() + SLOTS);
+            planes.resize(RADIUS, far);
+            planes
+        });
+        for &place in &places {
+            let sides = sides(&nodes[place as usize].aabb, scale);
+            for (planes, x) in planes.iter_mut().zip(sides) {
+                planes.push(x);
+            }
+        }
+        let mut clusters = Self {
+            planes,
+            places,
+            scale,
+        };
+        clusters.end();
+        clusters
+    }
+
+    /// Puts what is far after the last.
+    fn end(&mut self) {
+        let end = self.places.len() + RADIUS;
+        for (side, planes) in self.planes.iter_mut().enumerate() {
+            planes.truncate(end);
+            planes.resize(end + SLOTS - RADIUS, if side < 3 { -FAR } else { FAR });
         }
     }
 
+    /// The best partner of each.
+    fn search(&self, backend: Backend, nearest: &mut [u32]) {
+        let search = |(first, nearest): (usize, &mut [u32])| {
+            backend.run(Search {
+                planes: self.planes.each_ref().map(|planes| &planes[first..]),
+                first: first as u32,
+                nearest,
+            });
+        };
+        #[cfg(feature = "rayon")]
+        if nearest.len() > 4 * super::parallel::TASK {
+            use super::parallel::TASK;
+            use rayon::prelude::*;
+            let chunks = nearest.par_chunks_mut(TASK).enumerate();
+            chunks.for_each(|(chunk, nearest)| search((chunk * TASK, nearest)));
+            return;
+        }
+        search((0, nearest));
+    }
+
+    /// Joins those that are each other's nearest: how many are left.
+    fn join_pairs(&mut self, nodes: &mut Vec<Node>, nearest: &[u32]) -> usize {
+        let Self {
+            planes,
+            places,
+            scale,
+        } = self;
+        // What is left moves up: it never comes after where it was.
+        let mut left = 0;
+        let count = nearest.len();
+        let places_now = &mut places[..count];
+        let [x0, y0, z0, x1, y1, z1] = planes.each_mut().map(|planes| &mut planes[RADIUS..]);
+        let (x0, y0, z0) = (&mut x0[..count], &mut y0[..count], &mut z0[..count]);
+        let (x1, y1, z1) = (&mut x1[..count], &mut y1[..count], &mut z1[..count]);
+        for (index, &other) in nearest.iter().enumerate() {
+            let other = other as usize;
+            if left >= count || other >= count {
+                break;
+            }
+            let mutual = nearest[other] as usize == index;
+            if mutual && other < index {
+                continue;
+            }
+            let mut place = places_now[index];
+            if mutual && other != index {
+                let second = places_now[other];
+                let [a, b] = [place, second].map(|place| nodes[place as usize].aabb);
+                let aabb = a.join(b);
+                let node = Node {
+                    aabb,
+                    first: place,
+                    second: second | Node::INNER,
+                };
+                place = nodes.len() as u32;
+                nodes.push(node);
+                [x0[left], y0[left], z0[left], x1[left], y1[left], z1[left]] = sides(&aabb, *scale);
+            } else {
+                (x0[left], y0[left], z0[left]) = (x0[index], y0[index], z0[index]);
+                (x1[left], y1[left], z1[left]) = (x1[index], y1[index], z1[index]);
+            }
+            places_now[left] = place;
+            left += 1;
+        }
+        places.truncate(left);
+        self.end();
+        left
+    }
+}
+
+/// The planes of a box.
+#[inline(always)]
+fn sides(&Aabb { min, max }: &Aabb, scale: f32) -> [f32; 6] {
+    let (min, max) = (min * scale, max * scale);
+    [min.x, min.y, min.z, max.x, max.y, max.z]
+}
+
+/// For each of a run of clusters the one with which the box is least; of equals the first.
+///
+/// Areas are compared together with the place, which takes the last bits. So the order is one of pairs, the same
+/// seen from both sides: the least pair is always joined.
+struct Search<'a> {
+    /// From what is before the first on.
+    planes: [&'a [f32]; 6],
+    first: u32,
+    nearest: &'a mut [u32],
+}
+
+impl Operation for Search<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) {
+        let [x0, y0, z0, x1, y1, z1] = self.planes.map(|planes| planes.windows(SLOTS));
+        let around = x0.zip(y0).zip(z0).zip(x1).zip(y1).zip(z1);
+        let others = S::F32x8::of_bits(token, OTHERS);
+        let area_bits = S::F32x8::splat(token, f32::from_bits(!SLOT));
+        let slots = S::F32x8::load(token, &[0, 1, 2, 3, 4, 5, 6, 7].map(f32::from_bits));
+        let places = self.nearest.iter_mut().zip(self.first..);
+        for ((nearest, place), (((((x0, y0), z0), x1), y1), z1)) in places.zip(around) {
+            let min = [load(token, x0), load(token, y0), load(token, z0)];
+            let max = [load(token, x1), load(token, y1), load(token, z1)];
+            let own_min: [S::F32x8; 3] = splat3(token, [x0[RADIUS], y0[RADIUS], z0[RADIUS]]);
+            let own_max: [S::F32x8; 3] = splat3(token, [x1[RADIUS], y1[RADIUS], z1[RADIUS]]);
+            let x = own_max[0].max(max[0]) - own_min[0].min(min[0]);
+            let y = own_max[1].max(max[1]) - own_min[1].min(min[1]);
+            let z = own_max[2].max(max[2]) - own_min[2].min(min[2]);
+            let area = x * y + (x + y) * z;
+            let slot = ((area & area_bits) | slots).least(others);
+            *nearest = (place + slot as u32).wrapping_sub(RADIUS as u32);
+        }
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd>(token: S, window: &[f32]) -> S::F32x8 {
+    S::F32x8::load(token, window.first_chunk().unwrap_or(&[0.0; SLOTS]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
     /// Has a tree of all in parts of so many.
-    fn check(boxes: &[Aabb], part: usize) -> Vec<BinaryNode> {
+    fn check(boxes: &[Aabb], part: usize) -> Vec<Node> {
         let watch = Watch::none();
-        let leaves: Vec<_> = boxes.iter().zip(0..).map(|(&b, i)| leaf(i, b)).collect();
-        let parts: Vec<_> = leaves
-            .chunks(part)
-            .map(|leaves| Part::new(leaves.to_vec(), 1.0, &watch))
-            .collect();
-        let nodes = tree(&parts, 1.0, &watch);
+        let mut nodes = Vec::new();
+        let mut roots = Vec::new();
+        for (part, number) in boxes.chunks(part).zip((0..).step_by(part)) {
+            let start = nodes.len() as u32;
+            nodes.extend(part.iter().zip(number..).map(|(&b, i)| Node::leaf(b, i, 1)));
+            let clusters = (start..nodes.len() as u32).collect();
+            roots.extend(join(&mut nodes, clusters, part.len() / 4, 1.0, &watch));
+        }
+        let root = join(&mut nodes, roots, 1, 1.0, &watch);
+        assert_eq!(root, [nodes.len() as u32 - 1]);
         assert_eq!(nodes.len(), 2 * boxes.len() - 1);
+        // Every node but the root is another's child, once.
+        let mut led_to = vec![0; nodes.len()];
         for (index, node) in nodes.iter().enumerate() {
             let aabb = if node.is_leaf() {
-                boxes[node.first as usize]
+                boxes[node.number()]
             } else {
                 let [left, right] = node.children();
-                assert!(left > index);
+                assert!(left < index && right < index);
+                led_to[left] += 1;
+                led_to[right] += 1;
                 nodes[left].aabb.join(nodes[right].aabb)
             };
             assert_eq!(node.aabb, aabb);
         }
-        // Every leaf is there, once.
-        let order = (0..boxes.len() as u32).collect();
-        assert!(BinaryTree::new(nodes.clone(), order).is_ok());
+        assert!(led_to[..nodes.len() - 1].iter().all(|&times| times == 1));
+        let leaves = nodes.iter().filter(|node| node.is_leaf());
+        assert!(leaves.map(Node::number).eq(0..boxes.len()));
         nodes
     }
 
@@ -310,7 +326,7 @@ mod tests {
         // Pairs that are close are joined first.
         let pairs = [0.0, 0.002, 1.0, 1.002, 2.0, 2.002].map(at);
         let nodes = check(&pairs, 6);
-        let lowest = |node: &&BinaryNode| {
+        let lowest = |node: &&Node| {
             !node.is_leaf() && node.children().iter().all(|&child| nodes[child].is_leaf())
         };
         assert_eq!(nodes.iter().filter(lowest).count(), 3);
@@ -327,7 +343,7 @@ mod tests {
             .collect();
         let nodes = check(&boxes, boxes.len());
         let mut depths = vec![0; nodes.len()];
-        for (index, node) in nodes.iter().enumerate() {
+        for (index, node) in nodes.iter().enumerate().rev() {
             if !node.is_leaf() {
                 for child in node.children() {
                     depths[child] = depths[index] + 1;

@@ -8,7 +8,9 @@ use super::{
 use crate::{
     geometry::{Aabb, TriangleMesh},
     layout::{Bvh, ChildKind, Leaf, Owned, PrimitiveLeaf, TriangleLeaf, WideNode},
+    simd::{Backend, Operation, Simd},
 };
+use bytemuck::Zeroable;
 use core::ops::Range;
 use glam::Vec3;
 use std::{vec, vec::Vec};
@@ -37,7 +39,7 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
         let primitives = self.primitives();
         let moved = |leaf: &TriangleLeaf| move_leaf(mesh, leaf, &primitives[places(leaf)]);
         let leaves = map_all(self.leaves(), moved)?;
-        none_is_missing(&Triangles(mesh), primitives)?;
+        none_is_missing(&Triangles(mesh), self.leaves(), primitives)?;
         let (leaves, boxes) = leaves.into_iter().unzip();
         self.update(leaves, boxes);
         Ok(())
@@ -63,7 +65,7 @@ impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
             let ids = &primitives[places(leaf)];
             let aabb = ids.iter().try_fold(Aabb::EMPTY, |aabb, &id| {
                 match in_range(id, aabbs.len()).map(|id| input.verdict(id))? {
-                    Verdict::Keep(own) => Ok(aabb.join(own)),
+                    Verdict::Keep(own) => Ok(aabb.join(own.aabb())),
                     Verdict::Unhittable => Ok(aabb),
                     Verdict::NonFinite(error) | Verdict::Invalid(error) => Err(at(id, error)),
                 }
@@ -71,7 +73,7 @@ impl<N: WideNode> Bvh<N, PrimitiveLeaf, Owned> {
             Ok((*leaf, aabb))
         };
         let leaves = map_all(self.leaves(), moved)?;
-        none_is_missing(&input, primitives)?;
+        none_is_missing(&input, self.leaves(), primitives)?;
         let (leaves, mut boxes): (_, Vec<Aabb>) = leaves.into_iter().unzip();
         // A leaf of nothing is still a leaf, and has a place.
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, &aabb| all.join(aabb));
@@ -158,10 +160,14 @@ fn map_all<L: Leaf + Sync + Send>(
     })
 }
 
-/// What is in no leaf cannot be hit.
-fn none_is_missing<I: Input>(input: &I, primitives: &[u32]) -> Result<(), RefitError> {
+/// What is in no leaf cannot be hit. Parts that were put together may list what is in none.
+fn none_is_missing<I: Input>(
+    input: &I,
+    leaves: &[I::Leaf],
+    primitives: &[u32],
+) -> Result<(), RefitError> {
     let mut listed = vec![0u64; input.len().div_ceil(64)];
-    for &id in primitives {
+    for &id in leaves.iter().flat_map(|leaf| &primitives[places(leaf)]) {
         if let Some(word) = listed.get_mut(id as usize / 64) {
             *word |= 1 << (id % 64);
         }
@@ -194,8 +200,8 @@ fn move_leaf(
     for (triangle, &id) in ids.iter().enumerate() {
         let id = in_range(id, mesh.len())?;
         match triangles.verdict(id) {
-            Verdict::Keep(aabb) => {
-                bounds = bounds.join(aabb);
+            Verdict::Keep(own) => {
+                bounds = bounds.join(own.aabb());
                 have_area |= 1 << triangle;
             }
             // Its box keeps the leaf's from being none.
@@ -211,21 +217,48 @@ fn move_leaf(
     };
     let leaf = match moved {
         Some(vertices) => TriangleLeaf::from_lanes(vertices, leaf.corners, first, ids.len()),
-        None => {
-            let mut filling = Filling::EMPTY;
-            for (triangle, &id) in ids.iter().enumerate() {
-                let corners = Corners::new(mesh, id);
-                if have_area & 1 << triangle == 0 {
-                    filling.add_none(&corners);
-                } else if !filling.add(&corners) {
-                    let primitive = id as usize;
-                    return Err(RefitError::VerticesParted { primitive });
-                }
-            }
-            filling.leaf(first).unwrap_or(*leaf)
-        }
+        None => Backend::detect().run(Refill {
+            mesh,
+            ids,
+            have_area,
+            first,
+        })?,
     };
     Ok((leaf, bounds))
+}
+
+/// A leaf filled anew.
+struct Refill<'a> {
+    mesh: &'a TriangleMesh<'a>,
+    /// Some.
+    ids: &'a [u32],
+    have_area: u32,
+    first: u32,
+}
+
+impl Operation for Refill<'_> {
+    type Output = Result<TriangleLeaf, RefitError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) -> Self::Output {
+        let mut filling: Option<Filling<S>> = None;
+        for (triangle, &id) in self.ids.iter().enumerate() {
+            let corners = Corners::new(self.mesh, id);
+            let has_area = self.have_area & 1 << triangle != 0;
+            match &mut filling {
+                None if has_area => filling = Some(Filling::of(token, &corners)),
+                None => filling = Some(Filling::of_none(token, &corners)),
+                Some(filling) if !has_area => filling.add_none(),
+                Some(filling) => {
+                    if !filling.add(token, &corners) {
+                        let primitive = id as usize;
+                        return Err(RefitError::VerticesParted { primitive });
+                    }
+                }
+            }
+        }
+        Ok(filling.map_or(TriangleLeaf::zeroed(), |filling| filling.leaf(self.first)))
+    }
 }
 
 /// The vertices, if the lanes that triangles have for corners are still right: all corners that share one are at one

@@ -7,7 +7,7 @@ use super::{
     monitor::Watch,
 };
 use crate::geometry::{Aabb, TriangleMesh};
-use glam::Vec3A;
+use glam::Vec3;
 use std::{vec, vec::Vec};
 use wide::f32x4;
 
@@ -33,11 +33,11 @@ impl Ref {
     };
 
     #[inline]
-    pub fn new(aabb: &Aabb, id: u32) -> Self {
-        let Aabb { min, max } = *aabb;
+    pub fn new(bounds: &Bounds, id: u32) -> Self {
+        let [x, y, z, _] = bounds.max.to_array();
         Self {
-            min: f32x4::new([min.x, min.y, min.z, 0.0]),
-            max: f32x4::new([max.x, max.y, max.z, f32::from_bits(id + NUMBER_OFFSET)]),
+            min: bounds.min,
+            max: f32x4::new([x, y, z, f32::from_bits(id + NUMBER_OFFSET)]),
         }
     }
 
@@ -99,6 +99,32 @@ impl Bounds {
         self.join(Self { min: p, max: p })
     }
 
+    #[inline(always)]
+    pub fn of(&Aabb { min, max }: &Aabb) -> Self {
+        Self {
+            min: f32x4::new([min.x, min.y, min.z, 0.0]),
+            max: f32x4::new([max.x, max.y, max.z, 0.0]),
+        }
+    }
+
+    /// The unit of a scene of these bounds.
+    pub fn measure(&self) -> Measure {
+        // The fourth lanes are of no meaning, and those of what is empty neither.
+        let [x, y, z, _] = self.min.abs().fast_max(self.max.abs()).to_array();
+        match self.min.simd_le(self.max).to_bitmask() & 7 {
+            7 => Measure::new(x.max(y).max(z)),
+            _ => Measure::new(0.0),
+        }
+    }
+
+    /// The sum turns -0.0 into 0.0, so that the order of joins never shows.
+    #[inline(always)]
+    pub fn aabb(&self) -> Aabb {
+        let [x0, y0, z0, _] = (self.min + f32x4::ZERO).to_array();
+        let [x1, y1, z1, _] = (self.max + f32x4::ZERO).to_array();
+        Aabb::new(Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1))
+    }
+
     /// Of what is not empty.
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
@@ -122,14 +148,6 @@ pub(super) struct Refs {
     scale: f32,
 }
 
-/// What a run of primitives came to.
-#[derive(Clone, Copy)]
-struct Gathered {
-    kept: usize,
-    dropped: usize,
-    largest: f32,
-}
-
 /// The share of a build that this is.
 const GATHERED: f32 = 0.02;
 /// How many primitives are gathered in one go.
@@ -145,44 +163,15 @@ impl Refs {
         drop_non_finite: bool,
         watch: &Watch,
     ) -> Result<Self, BuildError> {
-        if input.len() > TriangleMesh::MAX_TRIANGLES {
-            return Err(BuildError::TooManyPrimitives(input.len()));
-        }
-        watch.phase(GATHERED, input.len())?;
-        let mut refs = vec![Ref::NONE; input.len()];
-        let gather = |(chunk, refs): (usize, &mut [Ref])| {
-            watch.advance(refs.len());
-            gather_chunk(input, chunk * CHUNK, refs, drop_non_finite)
-        };
-        #[cfg(feature = "rayon")]
-        let gathered: Vec<_> = {
-            use rayon::prelude::*;
-            refs.par_chunks_mut(CHUNK).enumerate().map(gather).collect()
-        };
-        #[cfg(not(feature = "rayon"))]
-        let gathered: Vec<_> = refs.chunks_mut(CHUNK).enumerate().map(gather).collect();
-
-        // Close the gaps that primitives left out have left at the chunks' ends.
-        let (mut kept, mut dropped, mut largest) = (0, 0, 0.0);
-        for (chunk, gathered) in gathered.into_iter().enumerate() {
-            let gathered: Gathered = gathered?;
-            let start = chunk * CHUNK;
-            if start != kept {
-                refs.copy_within(start..start + gathered.kept, kept);
-            }
-            kept += gathered.kept;
-            dropped += gathered.dropped;
-            largest = gathered.largest.max(largest);
-        }
-        refs.truncate(kept);
-
-        let scale = Measure::new(largest).scale();
+        let gathered = gather(input, drop_non_finite, watch, Ref::NONE, Ref::new)?;
+        let scale = gathered.bounds.measure().scale();
+        let mut refs = gathered.all;
         for r in &mut refs {
             *r = r.scaled(scale);
         }
         Ok(Self {
             refs,
-            dropped,
+            dropped: gathered.dropped,
             scale,
         })
     }
@@ -193,32 +182,96 @@ impl Refs {
     }
 }
 
-/// Fills the front of `refs` with the primitives that are kept, of those from `start` on.
-fn gather_chunk<I: Input>(
+/// What was made of primitives.
+pub(super) struct Gathered<T> {
+    /// Of each that has a place in the tree, in their order.
+    pub all: Vec<T>,
+    /// How many are not finite and were left out.
+    pub dropped: usize,
+    /// Around all.
+    pub bounds: Bounds,
+}
+
+/// Looks at every primitive, in parallel, and makes something of those that have a place in the tree.
+///
+/// # Errors
+/// The first primitive that is not finite, unless those are left out, or too many.
+pub(super) fn gather<I: Input, T: Copy + Send>(
+    input: &I,
+    drop_non_finite: bool,
+    watch: &Watch,
+    none: T,
+    make: impl Fn(&Bounds, u32) -> T + Sync,
+) -> Result<Gathered<T>, BuildError> {
+    if input.len() > TriangleMesh::MAX_TRIANGLES {
+        return Err(BuildError::TooManyPrimitives(input.len()));
+    }
+    watch.phase(GATHERED, input.len())?;
+    let mut all = vec![none; input.len()];
+    let gather = |(chunk, all): (usize, &mut [T])| {
+        watch.advance(all.len());
+        gather_chunk(input, chunk * CHUNK, all, drop_non_finite, &make)
+    };
+    #[cfg(feature = "rayon")]
+    let gathered: Vec<_> = {
+        use rayon::prelude::*;
+        all.par_chunks_mut(CHUNK).enumerate().map(gather).collect()
+    };
+    #[cfg(not(feature = "rayon"))]
+    let gathered: Vec<_> = all.chunks_mut(CHUNK).enumerate().map(gather).collect();
+
+    // Close the gaps that primitives left out have left at the chunks' ends.
+    let (mut kept, mut dropped, mut bounds) = (0, 0, Bounds::EMPTY);
+    for (chunk, gathered) in gathered.into_iter().enumerate() {
+        let gathered: Chunk = gathered?;
+        let start = chunk * CHUNK;
+        if start != kept {
+            all.copy_within(start..start + gathered.kept, kept);
+        }
+        kept += gathered.kept;
+        dropped += gathered.dropped;
+        bounds = bounds.join(gathered.bounds);
+    }
+    all.truncate(kept);
+    Ok(Gathered {
+        all,
+        dropped,
+        bounds,
+    })
+}
+
+/// What a run of primitives came to.
+#[derive(Clone, Copy)]
+struct Chunk {
+    kept: usize,
+    dropped: usize,
+    bounds: Bounds,
+}
+
+/// Fills the front of `all` with what is made of primitives that are kept, of those from `start` on.
+fn gather_chunk<I: Input, T>(
     input: &I,
     start: usize,
-    refs: &mut [Ref],
+    all: &mut [T],
     drop_non_finite: bool,
-) -> Result<Gathered, BuildError> {
-    let mut gathered = Gathered {
+    make: &impl Fn(&Bounds, u32) -> T,
+) -> Result<Chunk, BuildError> {
+    let mut chunk = Chunk {
         kept: 0,
         dropped: 0,
-        largest: 0.0,
+        bounds: Bounds::EMPTY,
     };
-    let mut largest = Vec3A::ZERO;
-    for id in start..start + refs.len() {
+    for id in start..start + all.len() {
         match input.verdict(id as u32) {
-            Verdict::Keep(aabb) => {
-                let (min, max) = (Vec3A::from(aabb.min), Vec3A::from(aabb.max));
-                largest = largest.max(min.abs()).max(max.abs());
-                refs[gathered.kept] = Ref::new(&aabb, id as u32);
-                gathered.kept += 1;
+            Verdict::Keep(bounds) => {
+                chunk.bounds = chunk.bounds.join(bounds);
+                all[chunk.kept] = make(&bounds, id as u32);
+                chunk.kept += 1;
             }
             Verdict::Unhittable => {}
-            Verdict::NonFinite(_) if drop_non_finite => gathered.dropped += 1,
+            Verdict::NonFinite(_) if drop_non_finite => chunk.dropped += 1,
             Verdict::NonFinite(error) | Verdict::Invalid(error) => return Err(error),
         }
     }
-    gathered.largest = largest.max_element();
-    Ok(gathered)
+    Ok(chunk)
 }

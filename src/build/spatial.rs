@@ -348,10 +348,9 @@ impl<I: Input> Upper<'_, '_, I> {
         // Not in the place of what is cut, which is as it was if the cut is given up.
         let below = self.pieces.add_piece(Piece { aabb: below, id });
         let above = self.pieces.add_piece(Piece { aabb: above, id });
-        Some(
-            [below, above]
-                .map(|number| Ref::new(&self.pieces.aabb(number), number).scaled(self.scale)),
-        )
+        Some([below, above].map(|number| {
+            Ref::new(&Bounds::of(&self.pieces.aabb(number)), number).scaled(self.scale)
+        }))
     }
 }
 

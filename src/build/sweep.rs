@@ -4,10 +4,10 @@
 
 use super::{
     binary::BinaryNode,
-    input::Input,
+    input::{Input, leaf_of},
     refs::{Bounds, Ref, half_areas},
 };
-use crate::geometry::Aabb;
+use crate::{geometry::Aabb, simd::Backend};
 use wide::f32x4;
 
 /// The most references that are swept. Above it bins are faster and lose next to nothing.
@@ -21,6 +21,7 @@ struct Sweep<'a, I> {
     /// The place of `refs[0]` in the tree's order.
     first: u32,
     leaves: Leaves,
+    backend: Backend,
 }
 
 /// How far down a tree goes: to single primitives; or to leaves of as many as there is room for, if their box is small.
@@ -67,6 +68,7 @@ pub(super) fn build<I: Input>(
         orders: [[0; MAX]; 3],
         first,
         leaves,
+        backend: Backend::detect(),
     };
     sweep.refs[..len].copy_from_slice(refs);
     let mut keys = [0; MAX];
@@ -153,9 +155,14 @@ impl<I: Input> Sweep<'_, I> {
         let bounds = refs.fold(Bounds::EMPTY, |bounds, &place| {
             bounds.join(self.refs[place as usize].bounds())
         });
-        let mut filling = I::EMPTY;
-        bounds.half_area() < self.leaves.below
-            && (start..end).all(|place| self.input.add(&mut filling, self.id(place)))
+        if bounds.half_area() >= self.leaves.below {
+            return false;
+        }
+        let mut ids = [0; MAX];
+        for (id, place) in ids.iter_mut().zip(start..end) {
+            *id = self.id(place);
+        }
+        leaf_of(self.backend, self.input, &ids[..end - start], 0).is_some()
     }
 
     /// The axis and the place of the cheapest cut; of equals the one nearest to halves.

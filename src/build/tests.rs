@@ -498,6 +498,23 @@ fn trees_of_others() {
     );
 }
 
+/// A tree of ours lists what can be hit, and is one that goes in.
+#[test]
+fn trees_of_ours_where_some_are_left_out() {
+    let mut positions = dust(4, 29);
+    positions[1] = [f32::NAN; 3];
+    let mut indices = soup(&positions);
+    indices.push([2; 3]);
+    let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+    let builder = Builder::new().drop_non_finite(true);
+    let tree = builder.build_binary(&mesh).unwrap();
+    let bvh = builder.build_from_tree(&mesh, &tree).unwrap();
+    check_bvh(&bvh, &[1, 2, 3], |id| {
+        Aabb::from_points(mesh.triangle(id as usize).unwrap())
+    });
+    assert_eq!(bvh.dropped(), 1);
+}
+
 #[test]
 fn trees_of_any_shape_fit_the_stack() {
     let mut random = Random(23);

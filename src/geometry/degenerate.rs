@@ -7,16 +7,16 @@ use glam::{Vec3, Vec3A};
 /// Such a triangle is never hit. It has no normal, and whether a ray "meets" it would be a matter of rounding.
 #[inline]
 pub(crate) fn is_degenerate(corners: [Vec3; 3]) -> bool {
-    !has_area(corners) && is_collinear(corners)
+    !has_area(corners.map(Vec3A::from)) && is_collinear(corners)
 }
 
-/// Whether `f32` is enough to see that a triangle has an area.
+/// Whether `f32` is enough to see that a triangle has an area, as nearly every one that has does: then it is not
+/// [degenerate](is_degenerate).
 ///
 /// A difference is off by 2^-24 of itself, a product by three times that, and the normal by 2^-21 of the terms; what
 /// products lose to underflow is less than that of terms of 2^-100.
 #[inline(always)]
-fn has_area(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(Vec3A::from);
+pub(crate) fn has_area([a, b, c]: [Vec3A; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac).abs();
     let terms = ab.abs().max_element() * ac.abs().max_element();

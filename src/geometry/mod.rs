@@ -7,6 +7,8 @@ mod mesh;
 mod ray;
 
 pub use aabb::Aabb;
+#[cfg(feature = "std")]
+pub(crate) use degenerate::has_area;
 pub(crate) use degenerate::is_degenerate;
 pub use hit::Hit;
 pub use mesh::{MeshError, Position, TriangleIndices, TriangleMesh};

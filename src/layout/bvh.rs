@@ -80,7 +80,17 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         bounds: Aabb,
     ) -> Result<Self, LayoutError> {
         let root = check::check::<N, L, S>(&nodes, &leaves, &primitives, &bounds)?;
-        Ok(Self {
+        Ok(Self::rooted(nodes, leaves, primitives, bounds, root))
+    }
+
+    fn rooted(
+        nodes: S::Slice<N>,
+        leaves: L::Store<S>,
+        primitives: S::Slice<u32>,
+        bounds: Aabb,
+        root: Child,
+    ) -> Self {
+        Self {
             numbers: L::numbers(&primitives),
             nodes,
             leaves,
@@ -89,13 +99,19 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
             bounds,
             backend: Backend::detect(),
             dropped: 0,
-        })
+        }
     }
 
     /// The nodes, the root first.
     #[inline(always)]
     pub fn nodes(&self) -> &[N] {
         &self.nodes
+    }
+
+    /// How the leaves are kept.
+    #[cfg(feature = "alloc")]
+    pub(super) fn leaf_store(&self) -> &L::Store<S> {
+        &self.leaves
     }
 
     /// What is read first of the leaf at a place.
@@ -144,7 +160,6 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     }
 
     /// Notes that the builder left out this many primitives.
-    #[cfg(feature = "std")]
     pub(crate) fn with_dropped(self, dropped: u32) -> Self {
         Self { dropped, ..self }
     }
@@ -204,6 +219,25 @@ impl<N: WideNode, M: Copy, S: Storage> Bvh<N, Runs<M>, S> {
 
 #[cfg(feature = "std")]
 impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
+    /// Puts together what the builder has emitted, which the check would let pass: that is up to the builder, and looked
+    /// at in debug builds alone, as it takes as long as the sort of a fast build.
+    ///
+    /// # Errors
+    /// More nodes, leaves or primitives than their numbers can tell apart.
+    pub(crate) fn from_emitted(
+        nodes: alloc::vec::Vec<N>,
+        leaves: alloc::vec::Vec<L>,
+        primitives: alloc::vec::Vec<u32>,
+        bounds: Aabb,
+    ) -> Result<Self, LayoutError> {
+        let root = check::root::<N, L>(nodes.len(), leaves.len(), primitives.len())?;
+        debug_assert_eq!(
+            check::check::<N, L, crate::layout::Owned>(&nodes, &leaves, &primitives, &bounds),
+            Ok(root)
+        );
+        Ok(Self::rooted(nodes, leaves, primitives, bounds, root))
+    }
+
     /// What changes when primitives move: leaves, nodes, and the bounds. That it stays sound is up to the caller.
     pub(crate) fn moving_parts(&mut self) -> (&mut alloc::vec::Vec<L>, &mut [N], &mut Aabb) {
         (&mut self.leaves, &mut self.nodes, &mut self.bounds)

@@ -71,17 +71,10 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     primitives: &[u32],
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
-    let most_nodes = ((1 << 31) - 2) / (size_of::<N>() / Link::UNIT);
-    if nodes.len() > most_nodes || primitives.len() > u32::MAX as usize {
-        return Err(LayoutError::TooLarge);
-    }
     let count = L::count::<S>(leaves, primitives)?;
+    let root = root::<N, L>(nodes.len(), count, primitives.len())?;
     if nodes.is_empty() {
-        return match L::only(count) {
-            _ if count == 0 => Ok(Child::EMPTY),
-            Some(place) => Ok(Child::leaf(place)),
-            None => Err(LayoutError::UnusedLeaves(0)),
-        };
+        return Ok(root);
     }
 
     // How many nodes and leaves have been led to so far: where the next ones must be.
@@ -130,7 +123,27 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     if next_leaf < count {
         return Err(LayoutError::UnusedLeaves(next_leaf));
     }
-    Ok(Child::node(0))
+    Ok(root)
+}
+
+/// Where a walk over so many nodes, leaves (or what is counted of them) and primitives begins, if their numbers can tell
+/// them apart.
+pub(super) fn root<N: WideNode, L: Leaves>(
+    nodes: usize,
+    count: usize,
+    primitives: usize,
+) -> Result<Child, LayoutError> {
+    let most = (1 << 31) - 2;
+    let most_nodes = most / (size_of::<N>() / Link::UNIT);
+    if nodes > most_nodes || count > most || primitives > u32::MAX as usize {
+        return Err(LayoutError::TooLarge);
+    }
+    match (nodes, L::only(count)) {
+        (0, _) if count == 0 => Ok(Child::EMPTY),
+        (0, Some(place)) => Ok(Child::leaf(place)),
+        (0, None) => Err(LayoutError::UnusedLeaves(1)),
+        _ => Ok(Child::node(0)),
+    }
 }
 
 /// How many children a node has: its first lanes, each with a box within `bounds`. The others lead

@@ -31,8 +31,8 @@ pub type CompactNode4 = CompactNode<4, Head4>;
 /// Up to 8 children in 80 bytes.
 pub type CompactNode8 = CompactNode<8, Head8>;
 
-impl_wide_node!(CompactNode4, 4, F32x4, 48, S::low);
-impl_wide_node!(CompactNode8, 8, F32x8, 80, core::convert::identity);
+impl_wide_node!(CompactNode4, 3, 4, F32x4, 48, S::low);
+impl_wide_node!(CompactNode8, 4, 8, F32x8, 80, core::convert::identity);
 
 /// The grid of a node's planes, by axis.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -1,6 +1,9 @@
 //! Leaves that are stored: a few triangles that share vertices, or a few of a caller's primitives.
 
-use super::Triangles;
+use super::{
+    Triangles,
+    bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
+};
 use crate::{
     primitive::triangle::{Corners, RayShear},
     simd::{Simd, Vector},
@@ -11,6 +14,10 @@ use glam::Vec3;
 
 /// What all leaves that are stored have: primitives, as a run of places in the hierarchy's list of primitive numbers.
 pub trait Leaf: Pod + Debug {
+    /// In the header of [bytes](super::bytes).
+    #[doc(hidden)]
+    const KIND: u32;
+
     /// Which places of the list are its own.
     fn primitives(&self) -> Range<u64>;
 
@@ -132,6 +139,8 @@ impl Triangles for &TriangleLeaf {
 }
 
 impl Leaf for TriangleLeaf {
+    const KIND: u32 = TRIANGLE_LEAVES;
+
     fn primitives(&self) -> Range<u64> {
         let first = u64::from(self.first);
         first..first + u64::from(self.count)
@@ -173,6 +182,8 @@ impl PrimitiveLeaf {
 }
 
 impl Leaf for PrimitiveLeaf {
+    const KIND: u32 = PRIMITIVE_LEAVES;
+
     fn primitives(&self) -> Range<u64> {
         let first = u64::from(self.first);
         first..first + u64::from(self.count)

@@ -65,9 +65,6 @@ impl<L: Leaf> Leaves for L {
     }
 
     fn count<S: Storage>(store: &S::Slice<L>, primitives: &[u32]) -> Result<usize, LayoutError> {
-        if store.len() > (1 << 31) - 2 {
-            return Err(LayoutError::TooLarge);
-        }
         for (index, leaf) in store.iter().enumerate() {
             if !leaf.is_sound() || leaf.primitives().end > primitives.len() as u64 {
                 return Err(LayoutError::Leaf(index));

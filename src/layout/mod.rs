@@ -1,6 +1,7 @@
 //! How a hierarchy lies in memory: nodes, leaves, and the check that makes them safe to walk.
 
 mod bvh;
+pub mod bytes;
 mod check;
 mod child;
 mod compact;
@@ -17,6 +18,7 @@ pub use bvh::{
 };
 #[cfg(feature = "alloc")]
 pub use bvh::{Bvh4, Bvh8, CompactBvh4, CompactBvh8, PrimitiveBvh4, PrimitiveBvh8};
+pub use bytes::{Aligned, BytesError, InBytes, Open};
 pub use check::LayoutError;
 pub(crate) use check::STACK;
 pub use child::{Child, ChildKind, Link};

@@ -13,6 +13,9 @@ use glam::Vec3;
 pub trait WideNode: Pod + sealed::Sealed {
     /// How many children it has at most.
     const WIDTH: usize;
+    /// In the header of [bytes](super::bytes).
+    #[doc(hidden)]
+    const KIND: u32;
     /// The ray in this node's terms, in a backend's vectors.
     #[doc(hidden)]
     type Slabs<S: Simd>: Copy;
@@ -80,14 +83,14 @@ pub(super) mod sealed {
     pub trait Sealed {}
 }
 
-/// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes that can
+/// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes, `$kind` in headers, that can
 /// - be made of children: `new`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome: `lanes`, `present`;
 /// - say where a lane, or every one, leads: `link`, `link_lanes`.
 macro_rules! impl_wide_node {
-    ($node:ty, $width:literal, $vector:ident, $bytes:literal, $narrow:expr) => {
+    ($node:ty, $kind:literal, $width:literal, $vector:ident, $bytes:literal, $narrow:expr) => {
         const _: () = assert!(size_of::<$node>() == $bytes);
 
         // SAFETY: floats and integers alone, `repr(C)`, and no padding: the size above is the sum
@@ -100,6 +103,7 @@ macro_rules! impl_wide_node {
 
         impl $crate::layout::WideNode for $node {
             const WIDTH: usize = $width;
+            const KIND: u32 = $kind;
             type Slabs<S: Simd> = RaySlabs<$width, S::$vector>;
             type Lanes<S: Simd> = S::$vector;
 

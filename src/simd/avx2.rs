@@ -149,6 +149,10 @@ macro_rules! impl_vector {
                 Self(unsafe { $cmp::<_CMP_LE_OQ>(self.0, other.0) })
             }
             #[inline(always)]
+            fn eq(self, other: Self) -> Self {
+                Self(unsafe { $cmp::<_CMP_EQ_OQ>(self.0, other.0) })
+            }
+            #[inline(always)]
             fn select(self, yes: Self, no: Self) -> Self {
                 Self(unsafe { $blend(no.0, yes.0, self.0) })
             }

@@ -103,6 +103,10 @@ macro_rules! impl_vector {
                 self.simd_le(other)
             }
             #[inline(always)]
+            fn eq(self, other: Self) -> Self {
+                self.simd_eq(other)
+            }
+            #[inline(always)]
             fn select(self, yes: Self, no: Self) -> Self {
                 <$vector>::bitselect(self, yes, no)
             }

@@ -125,6 +125,8 @@ pub trait Vector<const N: usize>:
     fn lt(self, other: Self) -> Self;
     /// Where `self <= other`; not beside a NaN.
     fn le(self, other: Self) -> Self;
+    /// Where `self == other`; not beside a NaN.
+    fn eq(self, other: Self) -> Self;
     /// `self` is a comparison's outcome: `yes` where it is set, else `no`.
     fn select(self, yes: Self, no: Self) -> Self;
     /// The same but for lane `lane` modulo `N`, which becomes `x`.

@@ -33,8 +33,8 @@ impl SceneExtent {
 }
 
 impl NarrowSlabs {
-    /// As [`RaySlabs::new`], an axis a lane, for nodes of `width` children. `reciprocal` is that of the ray's
-    /// direction.
+    /// As [`RaySlabs::new`], an axis a lane, for nodes of `width` children; and whether they are to be
+    /// [opened](Self::open), where they are kept. `reciprocal` is that of the ray's direction.
     #[inline(always)]
     pub(crate) fn new<V: Vector<4>>(
         token: V::Token,
@@ -42,7 +42,7 @@ impl NarrowSlabs {
         reciprocal: V,
         scene: &SceneExtent,
         width: usize,
-    ) -> Self {
+    ) -> (Self, bool) {
         let origin = V::load(token, ray.origin_and_more());
         let [x, y, z, _] = (V::load(token, &scene.0) + origin.abs()).to_array();
         let extent = greater(greater(x, y), greater(z, MIN_EXTENT));
@@ -51,7 +51,7 @@ impl NarrowSlabs {
         let [x, y, z, _] = reciprocal.abs().to_array();
         let margin = extent * (K_T * UNIT_ROUNDOFF) * lesser(lesser(x, y), z);
         let side = width * size_of::<f32>();
-        let mut slabs = Self {
+        let slabs = Self {
             reciprocal: reciprocal.to_array(),
             near: near.to_array(),
             far: far.to_array(),
@@ -63,19 +63,17 @@ impl NarrowSlabs {
             t_min: ray.t_min - margin,
             margin,
         };
-        if !matches!(
+        let near = matches!(
             extent.partial_cmp(&MAX_EXTENT),
             Some(core::cmp::Ordering::Less)
-        ) {
-            slabs.open();
-        }
-        slabs
+        );
+        (slabs, !near)
     }
 
     /// As [`RaySlabs`] does.
     #[cold]
     #[inline(never)]
-    fn open(&mut self) {
+    pub(crate) fn open(&mut self) {
         self.reciprocal = self.reciprocal.map(|r| pow2(-126).copysign(r));
         self.near = [-f32::MAX; 4];
         self.far = [f32::MAX; 4];

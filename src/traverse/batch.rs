@@ -2,6 +2,7 @@
 
 use super::{
     bundle,
+    classes::{self, Patience},
     query::{AnyHit, ClosestHit, Query},
     wave::{self, Lane},
 };
@@ -14,6 +15,9 @@ use core::{fmt, mem::MaybeUninit};
 
 /// Rays under way at a time where the memory is ours to choose.
 const LANES: usize = 32;
+
+/// As many rays are sorted out before those left over are interleaved.
+const WINDOW: usize = wave::GROUPS * bundle::RAYS;
 
 /// What `LANES` rays under way at a time are kept in, for batches on small stacks; 1 to 64 of them, some 2.3 KiB each.
 ///
@@ -174,32 +178,16 @@ impl<N: WideNode, S: Storage, Q: Query> Operation for Batch<'_, N, S, Q> {
         let bvh = self.bvh;
         let (rays, answers) = paired(self.rays, self.answers);
         let Scratch(mut lanes) = Scratch::<LANES>::new();
-        // Rays before `waiting` are answered, those from there to `next` are for a wave.
-        let (mut waiting, mut next) = (0, 0);
-        loop {
-            let end = rays.len().min(next + bundle::RAYS);
-            let alike = next < end
-                && bundle::trace::<T, N, S, Q>(
-                    token,
-                    bvh,
-                    &rays[next..end],
-                    &mut answers[next..end],
-                );
-            if alike || next == end {
-                let between = &rays[waiting..next];
-                wave::trace::<T, N, S, Q, LANES>(
-                    token,
-                    bvh,
-                    between,
-                    &mut answers[waiting..next],
-                    &mut lanes,
-                );
-                waiting = end;
+        let mut patience = Patience::default();
+        for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
+            let mut waiting = [0; wave::GROUPS];
+            let groups = rays
+                .chunks(bundle::RAYS)
+                .zip(answers.chunks_mut(bundle::RAYS));
+            for (waiting, (rays, answers)) in waiting.iter_mut().zip(groups) {
+                *waiting = classes::trace::<T, N, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            if next == end {
-                return;
-            }
-            next = end;
+            wave::trace::<T, N, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
         }
     }
 }
@@ -218,7 +206,10 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Operation for Wave<'
     #[inline(always)]
     fn run<T: Simd>(self, token: T) {
         let (rays, answers) = paired(self.rays, self.answers);
-        wave::trace::<T, N, S, Q, LANES>(token, self.bvh, rays, answers, &mut self.scratch.0);
+        for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
+            let (all, lanes) = ([u64::MAX; wave::GROUPS], &mut self.scratch.0);
+            wave::trace::<T, N, S, Q, LANES>(token, self.bvh, rays, answers, &all, lanes);
+        }
     }
 }
 
@@ -245,7 +236,8 @@ impl<N: WideNode, S: Storage, Q: Query, const RAYS: usize> Operation for Packet<
             }
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
-        if !bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]) {
+        let outcome = bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]);
+        if outcome == bundle::Outcome::Unlike {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = (self.one)(self.bvh, ray);
             }

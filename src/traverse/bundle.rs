@@ -27,6 +27,10 @@ const FEW: u32 = 2;
 /// How far apart the rays of a bundle may go, across for one along their largest component.
 const SPREAD: f32 = 0.5;
 
+/// A bundle is loose from so many tests of packets against boxes a ray on. Waves are faster where there are 13 (dragon's
+/// shadow rays), bundles where there are 4.
+const LOOSE: usize = 8;
+
 /// A number of each ray of a packet.
 type V<T> = <T as Simd>::F32x8;
 
@@ -60,6 +64,8 @@ struct Bundle<'a, T: Simd> {
     looking: u64,
     /// Those that have found something.
     found: u64,
+    /// How many boxes packets were tested against.
+    tests: usize,
 }
 
 /// A child to go to, for some of the rays.
@@ -73,20 +79,30 @@ struct Entry {
     rays: u64,
 }
 
-/// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike; else does nothing. Whether
-/// they are.
+/// What has come of a bundle.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// The rays are not alike: nothing was done.
+    Unlike,
+    /// The rays are traced, though their ways parted so soon that each by itself had been as fast.
+    Loose,
+    /// The rays are traced.
+    Tight,
+}
+
+/// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike.
 #[inline(always)]
 pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
     token: T,
     bvh: &Bvh<N, TriangleLeaf, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
-) -> bool {
+) -> Outcome {
     if bvh.root() == Child::EMPTY {
-        return false;
+        return Outcome::Unlike;
     }
     let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
-        return false;
+        return Outcome::Unlike;
     };
     bundle.walk::<N, S, Q>(token, bvh);
     let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
@@ -114,7 +130,11 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
             };
         }
     }
-    true
+    if bundle.tests > LOOSE * rays.len() {
+        Outcome::Loose
+    } else {
+        Outcome::Tight
+    }
 }
 
 impl<'a, T: Simd> Bundle<'a, T> {
@@ -161,6 +181,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             far: most(far),
             looking: u64::MAX >> (RAYS - rays.len().min(RAYS)),
             found: 0,
+            tests: 0,
         })
     }
 
@@ -243,14 +264,15 @@ impl<'a, T: Simd> Bundle<'a, T> {
     #[inline(always)]
     fn passing(&mut self, token: T, near: [f32; 3], far: [f32; 3], rays: u64) -> u64 {
         let (near, far) = (splat3(token, near), splat3(token, far));
-        let mut passing = 0;
-        for index in 0..self.count {
-            if (rays >> (LANES * index)) as u8 != 0 {
-                let packet = self.packet(index);
-                let (hit, _) = packet.slabs.between(near, far, packet.far);
-                passing |= u64::from(hit.bits()) << (LANES * index);
-            }
+        let (mut passing, mut tests) = (0, 0);
+        let mut left = rays;
+        while let Some(index) = first_packet(&mut left) {
+            let packet = self.packet(index);
+            let (hit, _) = packet.slabs.between(near, far, packet.far);
+            tests += 1;
+            passing |= u64::from(hit.bits()) << (LANES * index);
         }
+        self.tests += tests;
         passing & rays
     }
 
@@ -264,11 +286,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
         rays: u64,
     ) {
         let mut closer = 0;
-        for index in 0..self.count {
+        let mut left = rays;
+        while let Some(index) = first_packet(&mut left) {
             let lanes = u32::from((rays >> (LANES * index)) as u8);
-            if lanes == 0 {
-                continue;
-            }
             let found = u32::from((self.found >> (LANES * index)) as u8);
             let (axes, of_packet) = (self.axes, &self.rays[LANES * index..]);
             let packet = self.packet(index);
@@ -450,6 +470,17 @@ impl<T: Simd> Packet<T> {
         }
         new
     }
+}
+
+/// The first packet that has any of the rays. Takes its rays from them.
+#[inline(always)]
+fn first_packet(rays: &mut u64) -> Option<usize> {
+    if *rays == 0 {
+        return None;
+    }
+    let index = rays.trailing_zeros() as usize / LANES;
+    *rays &= !(0xff << (LANES * index));
+    Some(index)
 }
 
 /// Puts an entry where it belongs among those from `base` to `len`, of which the nearest is the last.

@@ -6,6 +6,7 @@
 mod batch;
 mod boxes;
 mod bundle;
+mod classes;
 mod count;
 mod one_by_one;
 mod primitives;

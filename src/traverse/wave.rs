@@ -21,6 +21,9 @@ use crate::{
 };
 use core::{hint::select_unpredictable, mem::MaybeUninit};
 
+/// The most runs of 64 rays of a wave.
+pub(super) const GROUPS: usize = 256;
+
 /// The most lanes of a wave.
 const MOST_LANES: usize = 64;
 
@@ -59,26 +62,26 @@ struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
     scene: SceneExtent,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    /// The next ray to start.
-    next: usize,
+    /// For each run of 64 rays a bit for each to be traced.
+    waiting: &'a [u64; GROUPS],
+    /// The run that is being started, and those of it that are left.
+    group: usize,
+    left: u64,
     lanes: &'a mut [MaybeUninit<Lane>; LANES],
-    at_node: List,
-    at_leaf: List,
-    /// At a leaf with candidates.
-    at_triangles: List,
-    at_end: List,
 }
 
 /// What a first look at a leaf has brought.
 type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
 
-/// Traces all `rays`, of which there are as many as `answers`.
+/// Traces those `rays` that `waiting` has a bit for, the first 64 in its first number and so on. There are as many as
+/// `answers`. Bits past the last ray are passed over.
 #[inline(always)]
 pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usize>(
     token: T,
     bvh: &Bvh<N, TriangleLeaf, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
+    waiting: &[u64; GROUPS],
     lanes: &mut [MaybeUninit<Lane>; LANES],
 ) {
     const { assert!(0 < LANES && LANES <= MOST_LANES) };
@@ -91,63 +94,81 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usi
         scene: SceneExtent::new(bvh.bounds()),
         rays,
         answers,
-        next: 0,
+        waiting,
+        group: 0,
+        left: waiting[0],
         lanes,
-        at_node: List::EMPTY,
-        at_leaf: List::EMPTY,
-        at_triangles: List::EMPTY,
-        at_end: List::EMPTY,
     };
-    for lane in 0..LANES {
-        wave.start(token, lane);
-    }
     wave.run(token);
 }
 
 impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LANES> {
     #[inline(always)]
     fn run<T: Simd>(&mut self, token: T) {
+        // Lengths apart from what they are of, and both from all else, so that they stay in registers.
+        let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
+        let (mut nodes, mut rest) = (0, 0);
+        // What comes after nodes: leaves, those of them with candidates, and ends.
+        let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
         // Apart, so that lists are short and what they are of is together.
         let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
+        for lane in 0..LANES {
+            let started = self.start(token, lane);
+            let leaf = self.bvh.root().is_leaf();
+            at_node.push_if(&mut nodes, lane, started & !leaf);
+            at_rest.push_if(&mut rest, lane, started & leaf);
+        }
         loop {
             // Leaves wait for company until few rays are at nodes.
-            let few = self.at_node.len <= LANES / 4;
-            if !few || self.at_leaf.len + self.at_end.len == 0 {
-                if self.at_node.len == 0 {
+            if nodes > LANES / 4 || rest == 0 {
+                if nodes == 0 {
                     return;
                 }
-                for place in 0..self.at_node.take() {
-                    let (lane, bvh) = (self.at_node.get(place), self.bvh);
+                for place in 0..take(&mut nodes) {
+                    let (lane, bvh) = (at_node.get(place), self.bvh);
                     let state = self.lane(lane);
                     state.test_node::<T, N, S, Q>(token, bvh);
-                    let current = state.current;
-                    self.sort(lane, current, true);
+                    let leaf = state.current.is_leaf();
+                    at_node.push_if(&mut nodes, lane, !leaf);
+                    at_rest.push_if(&mut rest, lane, leaf);
                 }
                 continue;
             }
-            for place in 0..self.at_leaf.take() {
-                let (lane, bvh) = (self.at_leaf.get(place), self.bvh);
+            let (mut leaves, mut triangles, mut ends) = (0, 0, 0);
+            for place in 0..take(&mut rest) {
+                let lane = at_rest.get(place);
+                let end = self.lane(lane).current == BOTTOM;
+                at_leaf.push_if(&mut leaves, lane, !end);
+                at_end.push_if(&mut ends, lane, end);
+            }
+            for place in 0..leaves {
+                let (lane, bvh) = (at_leaf.get(place), self.bvh);
                 // SAFETY: no more lanes are in a list than there are.
-                let look = unsafe { looks.get_unchecked_mut(self.at_triangles.len) };
+                let look = unsafe { looks.get_unchecked_mut(triangles) };
                 let state = self.lane(lane);
                 let stays = state.look_at_leaf(token, bvh, look);
-                let current = state.current;
-                self.at_triangles.push_if(lane, stays);
-                self.sort(lane, current, !stays);
+                let leaf = state.current.is_leaf();
+                at_triangles.push_if(&mut triangles, lane, stays);
+                at_node.push_if(&mut nodes, lane, !leaf);
+                at_rest.push_if(&mut rest, lane, leaf & !stays);
             }
-            for place in 0..self.at_triangles.take() {
-                let (lane, bvh) = (self.at_triangles.get(place), self.bvh);
+            for place in 0..triangles {
+                let (lane, bvh) = (at_triangles.get(place), self.bvh);
                 // SAFETY: written when the lane came to this place of the list.
                 let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
                 let state = self.lane(lane);
                 state.test_triangles::<T, N, S, Q>(token, bvh, look);
-                let current = state.current;
-                self.sort(lane, current, true);
+                let leaf = state.current.is_leaf();
+                at_node.push_if(&mut nodes, lane, !leaf);
+                at_rest.push_if(&mut rest, lane, leaf);
             }
-            for place in 0..self.at_end.take() {
-                let lane = self.at_end.get(place);
+            for place in 0..ends {
+                let lane = at_end.get(place);
                 self.finish(lane);
-                self.start(token, lane);
+                let started = self.start(token, lane);
+                let leaf = self.bvh.root().is_leaf();
+                at_node.push_if(&mut nodes, lane, started & !leaf);
+                at_rest.push_if(&mut rest, lane, started & leaf);
             }
         }
     }
@@ -159,21 +180,25 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
         unsafe { self.lanes.get_unchecked_mut(lane).assume_init_mut() }
     }
 
-    /// Puts a lane into the list for what it has come to, if `go`.
+    /// The number of the next ray to start.
     #[inline(always)]
-    fn sort(&mut self, lane: usize, current: Link, go: bool) {
-        let (leaf, end) = (current.is_leaf(), current == BOTTOM);
-        self.at_node.push_if(lane, go & !leaf);
-        self.at_leaf.push_if(lane, go & leaf & !end);
-        self.at_end.push_if(lane, go & end);
+    fn next(&mut self) -> Option<usize> {
+        while self.left == 0 {
+            self.group += 1;
+            self.left = *self.waiting.get(self.group)?;
+        }
+        let place = self.left.trailing_zeros() as usize;
+        self.left &= self.left - 1;
+        Some(64 * self.group + place)
     }
 
-    /// Starts the next ray that may hit something, if there is one.
+    /// Starts the next ray that may hit something. Whether there is one.
     #[inline(always)]
-    fn start<T: Simd>(&mut self, token: T, lane: usize) {
-        while let Some(ray) = self.rays.get(self.next) {
-            let index = self.next;
-            self.next += 1;
+    fn start<T: Simd>(&mut self, token: T, lane: usize) -> bool {
+        while let Some(index) = self.next() {
+            let Some(ray) = self.rays.get(index) else {
+                return false;
+            };
             let mut room = PreparedRay::ROOM;
             let Some(prepared) = PreparedRay::new(ray, &mut room) else {
                 if let Some(answer) = self.answers.get_mut(index) {
@@ -185,9 +210,9 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
             // SAFETY: `lane` is one of them.
             let state = unsafe { self.lanes.get_unchecked_mut(lane) };
             Lane::start::<T, N>(token, state, root, &self.scene, &prepared, index);
-            self.sort(lane, root, true);
-            return;
+            return true;
         }
+        false
     }
 
     /// Writes down a lane's answer.
@@ -216,7 +241,7 @@ impl Lane {
         index: usize,
     ) {
         let reciprocal = prepared.reciprocal::<T::F32x4>(token);
-        let slabs = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
+        let (slabs, open) = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
         let lane = lane.as_mut_ptr();
         // SAFETY: fields of memory that is there; the stacks need not be written.
         unsafe {
@@ -225,6 +250,9 @@ impl Lane {
             (&raw mut (*lane).far).write(prepared.ray.t_max + slabs.margin());
             (&raw mut (*lane).t_max).write(prepared.ray.t_max);
             (&raw mut (*lane).slabs).write(slabs);
+            if open {
+                (*lane).slabs.open();
+            }
             (&raw mut (*lane).ray).write(*prepared.ray);
             (&raw mut (*lane).axes).write(prepared.axes);
             let z = prepared.axes[2] % 4;
@@ -251,11 +279,13 @@ impl Lane {
         let (hit, near) = node.test(token, &slabs, far);
         let mask = hit.bits();
         let links = node.link_lanes(token);
-        let above = self.top + 1;
+        // Read once: it might be in what is written below, for all that the compiler sees.
+        let top = self.top;
+        let above = top + 1;
         // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children behind, which `top` is at
         // most, and a vector's worth of places is above them. `top` and those below were written. `child` is a lane.
         unsafe {
-            let last = self.links.get_unchecked(self.top).assume_init();
+            let last = self.links.get_unchecked(top).assume_init();
             let above_links = self.links.as_mut_ptr().add(above).cast();
             let child = if Q::CLOSEST {
                 let nearest = near.least(hit);
@@ -271,7 +301,7 @@ impl Lane {
             let child = node.link(child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
-        self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);
+        self.top = (top + mask.count_ones() as usize).wrapping_sub(1);
 
         // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
         // 32 bits hold.
@@ -363,35 +393,29 @@ impl Lane {
     }
 }
 
-/// Lanes that are to do the same next.
-struct List {
-    lanes: [u8; MOST_LANES + 1],
-    len: usize,
-}
+/// Lanes that are to do the same next. How many is known apart.
+struct List([u8; MOST_LANES + 1]);
 
 impl List {
-    const EMPTY: Self = Self {
-        lanes: [0; MOST_LANES + 1],
-        len: 0,
-    };
-
-    /// Empties the list. Its places can be read until others are pushed over them.
-    #[inline(always)]
-    fn take(&mut self) -> usize {
-        core::mem::take(&mut self.len)
-    }
+    const EMPTY: Self = Self([0; MOST_LANES + 1]);
 
     #[inline(always)]
     fn get(&self, place: usize) -> usize {
-        // SAFETY: `place` was below `len`, which is at most the number of lanes.
-        usize::from(unsafe { *self.lanes.get_unchecked(place) })
+        // SAFETY: `place` was below the length, which is at most the number of lanes.
+        usize::from(unsafe { *self.0.get_unchecked(place) })
     }
 
     /// Written always, kept or not: no branch.
     #[inline(always)]
-    fn push_if(&mut self, lane: usize, wanted: bool) {
-        // SAFETY: a lane is in one list once at most, so `len` is at most `MOST_LANES`.
-        unsafe { *self.lanes.get_unchecked_mut(self.len) = lane as u8 };
-        self.len += usize::from(wanted);
+    fn push_if(&mut self, len: &mut usize, lane: usize, wanted: bool) {
+        // SAFETY: a lane is in a list once at most, so `len` is at most `MOST_LANES`.
+        unsafe { *self.0.get_unchecked_mut(*len) = lane as u8 };
+        *len += usize::from(wanted);
     }
+}
+
+/// Empties a list. Its places can be read until others are pushed over them.
+#[inline(always)]
+fn take(len: &mut usize) -> usize {
+    core::mem::take(len)
 }

@@ -1,0 +1,23 @@
+//! What the fuzz targets share: inputs made of a fuzzer's bytes, and the contract that answers are held to.
+//!
+//! - `float`, `mesh`, `boxes`, `rays`, `settings`: the inputs.
+//! - `width`: builds and queries, for nodes of each width; `ask`: every query there is, on every backend.
+//! - `truth`: what the reference says.
+
+mod ask;
+mod boxes;
+mod float;
+mod mesh;
+mod rays;
+mod settings;
+mod truth;
+mod width;
+
+pub use ask::{Answers, Found, found};
+pub use boxes::{BoxBytes, Liar, boxes, corners};
+pub use float::{Float, floats};
+pub use mesh::{Mesh, MeshBytes, Move, moved};
+pub use rays::{RayBytes, rays};
+pub use settings::{Cancel, Settings};
+pub use truth::{assert_all, first_not_finite, of_boxes, of_mesh};
+pub use width::{Boxes, Triangles, Width};

@@ -1,0 +1,124 @@
+//! What is wrong with bytes.
+
+use crate::{
+    geometry::MeshError,
+    layout::{LayoutError, MeshTooSmall},
+};
+use core::{error::Error, fmt};
+
+/// Why bytes are not a hierarchy of the kind that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BytesError {
+    /// So many bytes are no header.
+    NoHeader(usize),
+    /// The first bytes are not those of this format.
+    NotAHierarchy,
+    /// Written by a machine of the other byte order.
+    ByteOrder,
+    /// Written by another version of the format.
+    Version(u32),
+    /// Other nodes than were asked for: their number in the header.
+    Nodes {
+        /// The number asked for.
+        expected: u32,
+        /// The number in the header.
+        found: u32,
+    },
+    /// Other leaves than were asked for: their number in the header.
+    Leaves {
+        /// The number asked for.
+        expected: u32,
+        /// The number in the header.
+        found: u32,
+    },
+    /// More or fewer bytes than the header tells of.
+    Length {
+        /// How many there should be; more than there can be if the counts make no sense.
+        expected: u64,
+        /// How many there are.
+        found: usize,
+    },
+    /// The bytes do not start at a multiple of this.
+    Misaligned {
+        /// What the first byte's address is to be a multiple of.
+        needed: usize,
+    },
+    /// Some bytes have changed.
+    Checksum {
+        /// In the header.
+        expected: u32,
+        /// Of the bytes.
+        found: u32,
+    },
+    /// The parts are not a hierarchy.
+    Layout(LayoutError),
+    /// The buffers are not a mesh.
+    Mesh(MeshError),
+    /// The mesh has too few triangles: none if there is no mesh in the file.
+    MeshTooSmall(MeshTooSmall),
+    /// More of this than the header can count.
+    TooMany(&'static str),
+}
+
+impl fmt::Display for BytesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoHeader(len) => write!(f, "{len} bytes are too few for a header"),
+            Self::NotAHierarchy => write!(f, "the first bytes are not those of a hierarchy"),
+            Self::ByteOrder => write!(f, "written by a machine of the other byte order"),
+            Self::Version(version) => write!(f, "version {version} of the format is not known"),
+            Self::Nodes { expected, found } => {
+                write!(f, "nodes of kind {found}, not of kind {expected}")
+            }
+            Self::Leaves { expected, found } => {
+                write!(f, "leaves of kind {found}, not of kind {expected}")
+            }
+            Self::Length { expected, found } => {
+                write!(f, "{found} bytes where the header tells of {expected}")
+            }
+            Self::Misaligned { needed } => {
+                write!(f, "the first byte is not at a multiple of {needed}")
+            }
+            Self::Checksum { expected, found } => {
+                write!(
+                    f,
+                    "some bytes have changed: checksum {found:08x}, not {expected:08x}"
+                )
+            }
+            Self::Layout(error) => error.fmt(f),
+            Self::Mesh(error) => error.fmt(f),
+            Self::MeshTooSmall(error) => error.fmt(f),
+            Self::TooMany(what) => write!(f, "more {what} than the header can count"),
+        }
+    }
+}
+
+impl Error for BytesError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Layout(error) => Some(error),
+            Self::Mesh(error) => Some(error),
+            Self::MeshTooSmall(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<LayoutError> for BytesError {
+    fn from(error: LayoutError) -> Self {
+        Self::Layout(error)
+    }
+}
+
+impl From<MeshError> for BytesError {
+    fn from(error: MeshError) -> Self {
+        Self::Mesh(error)
+    }
+}
+
+impl From<MeshTooSmall> for BytesError {
+    fn from(error: MeshTooSmall) -> Self {
+        Self::MeshTooSmall(error)
+    }
+}

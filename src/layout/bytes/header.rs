@@ -1,0 +1,182 @@
+//! The first bytes: what follows, and how much of it.
+
+use super::{ALIGN, BytesError};
+use crate::geometry::Aabb;
+#[cfg(feature = "alloc")]
+use crate::layout::{Bvh, Storage, WideNode, bytes::InBytes};
+use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
+
+/// Leaves of [`TriangleLeaf`](crate::layout::TriangleLeaf).
+pub(in crate::layout) const TRIANGLE_LEAVES: u32 = 1;
+/// Leaves of [`PrimitiveLeaf`](crate::layout::PrimitiveLeaf).
+pub(in crate::layout) const PRIMITIVE_LEAVES: u32 = 2;
+/// Leaves that are runs of the list of primitive numbers.
+pub(super) const RUNS: u32 = 3;
+
+/// The first 128 bytes.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Header {
+    magic: [u8; 8],
+    /// 0x01020304, in the byte order of the machine that wrote it.
+    byte_order: u32,
+    version: u32,
+    /// 1 to 4: of 4 children, of 8, compact of 4, compact of 8.
+    pub node_kind: u32,
+    /// 1 to 3: of triangles, of a caller's primitives, runs.
+    pub leaf_kind: u32,
+    nodes: u32,
+    leaves: u32,
+    primitives: u32,
+    positions: u32,
+    triangles: u32,
+    pub(super) dropped: u32,
+    /// x, y, z of the least corner, then of the greatest.
+    bounds: [f32; 6],
+    pub(super) checksum: u32,
+    reserved: [u32; 13],
+}
+
+const _: () = assert!(size_of::<Header>() == 128);
+
+const MAGIC: [u8; 8] = *b"wide-bvh";
+const BYTE_ORDER: u32 = 0x0102_0304;
+const VERSION: u32 = 1;
+/// Bytes of a node, by kind less 1.
+const NODE_SIZES: [u64; 4] = [112, 224, 48, 80];
+/// Bytes of a leaf, by kind less 1.
+const LEAF_SIZES: [u64; 3] = [128, 8, 0];
+
+/// Where the sections are, and where they end.
+pub(super) struct Places {
+    pub sections: [Range<usize>; 5],
+    len: usize,
+}
+
+impl Places {
+    /// How many bytes there are in all.
+    #[cfg(feature = "alloc")]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+}
+
+impl Header {
+    /// That of a hierarchy with so many bytes of leaves, and so many positions and triangles.
+    ///
+    /// # Errors
+    /// More positions than can be counted.
+    #[cfg(feature = "alloc")]
+    pub(super) fn new<N: WideNode, L: InBytes>(
+        bvh: &Bvh<N, L, impl Storage>,
+        leaf_bytes: usize,
+        positions: usize,
+        triangles: usize,
+    ) -> Result<Self, BytesError> {
+        let leaf_size = LEAF_SIZES[L::KIND as usize - 1].max(1);
+        let Aabb { min, max } = *bvh.bounds();
+        Ok(Self {
+            magic: MAGIC,
+            byte_order: BYTE_ORDER,
+            version: VERSION,
+            node_kind: N::KIND,
+            leaf_kind: L::KIND,
+            nodes: bvh.nodes().len() as u32,
+            leaves: (leaf_bytes as u64 / leaf_size) as u32,
+            primitives: bvh.primitives().len() as u32,
+            positions: u32::try_from(positions).map_err(|_| BytesError::TooMany("positions"))?,
+            triangles: triangles as u32,
+            dropped: bvh.dropped() as u32,
+            bounds: [min.x, min.y, min.z, max.x, max.y, max.z],
+            ..Self::zeroed()
+        })
+    }
+
+    /// The header of a file: the kinds tell which hierarchy to open it as.
+    ///
+    /// # Errors
+    /// There is none, or none that is known here.
+    pub fn read(bytes: &[u8]) -> Result<Self, BytesError> {
+        let first = bytes.get(..size_of::<Self>());
+        let first = first.ok_or(BytesError::NoHeader(bytes.len()))?;
+        let header: Self = bytemuck::pod_read_unaligned(first);
+        if header.magic != MAGIC {
+            return Err(BytesError::NotAHierarchy);
+        }
+        if header.byte_order != BYTE_ORDER {
+            return Err(BytesError::ByteOrder);
+        }
+        if header.version != VERSION {
+            return Err(BytesError::Version(header.version));
+        }
+        Ok(header)
+    }
+
+    /// # Errors
+    /// Other nodes or leaves.
+    pub(super) fn expect(&self, nodes: u32, leaves: u32) -> Result<(), BytesError> {
+        let (found, expected) = (self.node_kind, nodes);
+        if found != expected {
+            return Err(BytesError::Nodes { expected, found });
+        }
+        let (found, expected) = (self.leaf_kind, leaves);
+        if found != expected {
+            return Err(BytesError::Leaves { expected, found });
+        }
+        Ok(())
+    }
+
+    /// Where nodes, leaves, primitives, positions and indices are, all within the bytes.
+    ///
+    /// # Errors
+    /// There are more bytes or fewer than for those.
+    pub(super) fn sections(&self, bytes: &[u8]) -> Result<[Range<usize>; 5], BytesError> {
+        let (_, end) = self.ends();
+        if end != bytes.len() as u64 {
+            return Err(BytesError::Length {
+                expected: end,
+                found: bytes.len(),
+            });
+        }
+        Ok(self.places().sections)
+    }
+
+    /// The sections' places, none of which is past what a `usize` counts.
+    pub(super) fn places(&self) -> Places {
+        let (sections, end) = self.ends();
+        Places {
+            sections: sections.map(|Range { start, end }| start as usize..end as usize),
+            len: end as usize,
+        }
+    }
+
+    /// The sections' places, and where the last one's padding ends.
+    fn ends(&self) -> ([Range<u64>; 5], u64) {
+        let size = |sizes: &[u64], kind: u32| {
+            let size = sizes.get((kind as usize).wrapping_sub(1));
+            size.copied().unwrap_or(0)
+        };
+        let lengths = [
+            u64::from(self.nodes) * size(&NODE_SIZES, self.node_kind),
+            u64::from(self.leaves) * size(&LEAF_SIZES, self.leaf_kind),
+            u64::from(self.primitives) * 4,
+            u64::from(self.positions) * 12,
+            u64::from(self.triangles) * 12,
+        ];
+        // 2^32 of the largest of each are far below 2^64.
+        let mut at = size_of::<Self>() as u64;
+        let sections = lengths.map(|length| {
+            let start = at;
+            at = (at + length).next_multiple_of(ALIGN as u64);
+            start..start + length
+        });
+        (sections, at)
+    }
+
+    /// The bounds of all primitives.
+    pub(super) fn bounds(&self) -> Aabb {
+        let [ax, ay, az, bx, by, bz] = self.bounds;
+        Aabb::new([ax, ay, az].into(), [bx, by, bz].into())
+    }
+}

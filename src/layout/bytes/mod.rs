@@ -1,0 +1,202 @@
+//! Hierarchies as bytes: written once, opened in place anywhere, not trusted.
+//!
+//! All numbers are in the byte order of the machine that wrote them, which the header tells. A file is the header,
+//! then the sections in the order below, each from the next multiple of [`ALIGN`] bytes on, zeros between them,
+//! its length a multiple of [`ALIGN`]. Places and lengths follow from the header's counts.
+//!
+//! | section | what it is an array of |
+//! | --- | --- |
+//! | nodes | [`Node4`](super::Node4), [`Node8`](super::Node8), [`CompactNode4`](super::CompactNode4) or [`CompactNode8`](super::CompactNode8) |
+//! | leaves | [`TriangleLeaf`](super::TriangleLeaf) or [`PrimitiveLeaf`](super::PrimitiveLeaf); none if leaves are runs |
+//! | primitives | numbers of primitives, 4 bytes each |
+//! | positions | of a mesh's vertices, 12 bytes each; none without a mesh |
+//! | indices | three corners of 4 bytes each, as places of positions |
+
+mod checksum;
+mod error;
+mod header;
+
+pub use checksum::seal;
+pub use error::BytesError;
+pub use header::Header;
+pub(super) use header::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES};
+
+use super::{Borrowed, Bvh, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode};
+use crate::geometry::TriangleMesh;
+use bytemuck::{Pod, cast_slice};
+use core::ops::Range;
+
+/// Bytes that start at a multiple of 64, as [`from_bytes`](Bvh::from_bytes) may want: around an `include_bytes!`, say.
+///
+/// ```
+/// use wide_bvh::layout::Aligned;
+///
+/// static SCENE: &Aligned<[u8]> = &Aligned(*b"what include_bytes! gives");
+/// assert!(SCENE.0.as_ptr().cast::<[u128; 4]>().is_aligned());
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct Aligned<T: ?Sized>(pub T);
+
+/// Every section starts at a multiple of this, of bytes from the first.
+pub const ALIGN: usize = 64;
+
+/// Leaves that can be written.
+pub trait InBytes: Leaves {
+    /// In the header.
+    #[doc(hidden)]
+    const KIND: u32;
+    /// What there is to write: the leaves, and of a mesh the positions and indices.
+    #[doc(hidden)]
+    fn sections<S: Storage>(store: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]);
+}
+
+/// Leaves that can be read in place for as long as `'a`.
+pub trait Open<'a>: InBytes {
+    /// Over what was read.
+    ///
+    /// # Errors
+    /// The mesh has an index out of range.
+    #[doc(hidden)]
+    fn open(
+        leaves: &'a [u8],
+        positions: &'a [[f32; 3]],
+        indices: &'a [[u32; 3]],
+    ) -> Result<Self::Store<Borrowed<'a>>, BytesError>;
+    /// How many primitives there are, if that is known.
+    #[doc(hidden)]
+    fn known(store: &Self::Store<Borrowed<'a>>) -> Option<usize>;
+}
+
+impl<L: Leaf> InBytes for L {
+    const KIND: u32 = <L as Leaf>::KIND;
+
+    fn sections<S: Storage>(store: &S::Slice<L>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+        (cast_slice(store), &[], &[])
+    }
+}
+
+impl<'a, L: Leaf> Open<'a> for L {
+    fn open(leaves: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<&'a [L], BytesError> {
+        cast(leaves)
+    }
+
+    fn known(_: &&'a [L]) -> Option<usize> {
+        None
+    }
+}
+
+impl InBytes for RunLeaf {
+    const KIND: u32 = header::RUNS;
+
+    fn sections<S: Storage>((): &()) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+        (&[], &[], &[])
+    }
+}
+
+impl<'a> Open<'a> for RunLeaf {
+    fn open(_: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<(), BytesError> {
+        Ok(())
+    }
+
+    fn known((): &()) -> Option<usize> {
+        None
+    }
+}
+
+impl InBytes for MeshLeaf<'_> {
+    const KIND: u32 = header::RUNS;
+
+    fn sections<S: Storage>(mesh: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+        (&[], mesh.positions(), mesh.indices())
+    }
+}
+
+impl<'a> Open<'a> for MeshLeaf<'a> {
+    fn open(
+        _: &'a [u8],
+        positions: &'a [[f32; 3]],
+        indices: &'a [[u32; 3]],
+    ) -> Result<TriangleMesh<'a>, BytesError> {
+        Ok(TriangleMesh::new(positions, indices)?)
+    }
+
+    fn known(mesh: &TriangleMesh<'a>) -> Option<usize> {
+        Some(mesh.len())
+    }
+}
+
+impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
+    /// Opens a hierarchy in place: no copy, no allocation, and no trust. The bytes are checked once, in linear time,
+    /// and are then traversed as any hierarchy is.
+    ///
+    /// They are to start at a multiple of the alignment of nodes and leaves: 4 for compact nodes without leaves of
+    /// their own, else up to 64. What maps a file or allocates pages gives that; see also [`Aligned`].
+    ///
+    /// # Errors
+    /// Whatever else than a whole file of this version, machine and kind, unharmed: what is wrong with it and where.
+    pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, BytesError> {
+        let header = Header::read(bytes)?;
+        header.expect(N::KIND, L::KIND)?;
+        let [nodes, leaves, primitives, positions, indices] = header.sections(bytes)?;
+        checksum::check(bytes)?;
+        let store = L::open(
+            &bytes[leaves],
+            cast(&bytes[positions])?,
+            cast(&bytes[indices])?,
+        )?;
+        let known = L::known(&store);
+        let bvh = Self::from_parts(
+            cast(&bytes[nodes])?,
+            store,
+            cast(&bytes[primitives])?,
+            header.bounds(),
+        )?;
+        match known {
+            Some(triangles) if bvh.numbers > triangles as u64 => {
+                let needed = bvh.numbers;
+                Err(MeshTooSmall { triangles, needed }.into())
+            }
+            _ => Ok(bvh.with_dropped(header.dropped)),
+        }
+    }
+}
+
+/// The elements that bytes are.
+///
+/// # Errors
+/// They are not where such elements may be.
+fn cast<T: Pod>(bytes: &[u8]) -> Result<&[T], BytesError> {
+    bytemuck::try_cast_slice(bytes).map_err(|_| BytesError::Misaligned {
+        needed: align_of::<T>(),
+    })
+}
+
+#[cfg(feature = "alloc")]
+impl<N: WideNode, L: InBytes, S: Storage> Bvh<N, L, S> {
+    /// The hierarchy as bytes, for [`from_bytes`](Bvh::from_bytes) on any machine of this byte order: of one
+    /// [`over`](Bvh::over) a mesh, mesh and all.
+    ///
+    /// # Errors
+    /// More positions than the header can count.
+    pub fn to_bytes(&self) -> Result<alloc::vec::Vec<u8>, BytesError> {
+        let (leaves, positions, indices) = L::sections::<S>(self.leaf_store());
+        let header = Header::new::<N, L>(self, leaves.len(), positions.len(), indices.len())?;
+        let places = header.places();
+        let mut bytes = alloc::vec![0; places.len()];
+        let mut put = |place: Range<usize>, section: &[u8]| bytes[place].copy_from_slice(section);
+        put(0..size_of::<Header>(), bytemuck::bytes_of(&header));
+        let sections = [
+            cast_slice(self.nodes()),
+            leaves,
+            cast_slice(self.primitives()),
+            cast_slice(positions),
+            cast_slice(indices),
+        ];
+        for (place, section) in places.sections.into_iter().zip(sections) {
+            put(place, section);
+        }
+        seal(&mut bytes);
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,270 @@
+//! Hierarchies written and opened again: the same answers, and an error for whatever else.
+
+mod common;
+
+use common::{SEED, bits};
+use wide_bvh::{
+    build::Builder,
+    geometry::{Aabb, Ray, TriangleMesh},
+    layout::{
+        Aligned, Borrowed, Bvh, Bvh4, Bvh8, BytesError, CompactBvh4, CompactBvh8, CompactNode4,
+        CompactNode8, InBytes, MeshBvh4, MeshBvh8, MeshLeaf, Node4, Node8, Open, PrimitiveLeaf,
+        RunLeaf, Storage, TriangleLeaf, WideNode, bytes::seal,
+    },
+};
+
+/// A mesh of some hundred triangles, and rays at it.
+struct Scene {
+    positions: Vec<[f32; 3]>,
+    indices: Vec<[u32; 3]>,
+    rays: Vec<Ray>,
+}
+
+impl Scene {
+    fn new(triangles: usize) -> Self {
+        let mut random = fastrand::Rng::with_seed(SEED);
+        let mut point = move || [(); 3].map(|()| 4.0 * random.f32() - 2.0);
+        let positions: Vec<[f32; 3]> = (0..triangles + 2).map(|_| point()).collect();
+        let indices = (0..triangles as u32).map(|i| [i, i + 1, i + 2]).collect();
+        let rays = (0..100).map(|_| Ray::new(point(), point())).collect();
+        Self {
+            positions,
+            indices,
+            rays,
+        }
+    }
+
+    fn mesh(&self) -> TriangleMesh<'_> {
+        TriangleMesh::new(&self.positions, &self.indices).unwrap()
+    }
+}
+
+/// Bytes where any hierarchy may be.
+fn aligned(bytes: &[u8]) -> Vec<Aligned<[u8; 64]>> {
+    let blocks = bytes.chunks(64).map(|block| {
+        let mut aligned = Aligned([0; 64]);
+        aligned.0[..block.len()].copy_from_slice(block);
+        aligned
+    });
+    blocks.collect()
+}
+
+fn bytes_of(blocks: &[Aligned<[u8; 64]>], len: usize) -> &[u8] {
+    // SAFETY: blocks of 64 bytes without padding, and no more of them.
+    unsafe { std::slice::from_raw_parts(blocks.as_ptr().cast(), len.min(64 * blocks.len())) }
+}
+
+/// Opens what was written, and has `same` compare the two.
+fn there_and_back<N: WideNode, L: InBytes, S: Storage>(
+    bvh: &Bvh<N, L, S>,
+    same: impl Fn(&[u8]),
+) -> Vec<u8> {
+    let bytes = bvh.to_bytes().unwrap();
+    assert_eq!(bytes.len() % 64, 0);
+    same(bytes_of(&aligned(&bytes), bytes.len()));
+    bytes
+}
+
+#[test]
+fn triangles_there_and_back() {
+    let scene = Scene::new(500);
+    let mesh = scene.mesh();
+    let eight: Bvh8 = Builder::new().build(&mesh).unwrap();
+    there_and_back(&eight, |bytes| {
+        let opened = Bvh::<Node8, TriangleLeaf, Borrowed>::from_bytes(bytes).unwrap();
+        assert_eq!(opened.bounds(), eight.bounds());
+        for ray in &scene.rays {
+            assert_eq!(bits(opened.closest_hit(ray)), bits(eight.closest_hit(ray)));
+        }
+    });
+    let four: Bvh4 = Builder::new().build_as(&mesh).unwrap();
+    there_and_back(&four, |bytes| {
+        let opened = Bvh::<Node4, TriangleLeaf, Borrowed>::from_bytes(bytes).unwrap();
+        for ray in &scene.rays {
+            assert_eq!(bits(opened.closest_hit(ray)), bits(eight.closest_hit(ray)));
+        }
+    });
+}
+
+#[test]
+fn compact_ones_there_and_back() {
+    let scene = Scene::new(500);
+    let mesh = scene.mesh();
+    let full: Bvh8 = Builder::new().build(&mesh).unwrap();
+    let eight: CompactBvh8 = Builder::new().build_compact(&mesh).unwrap();
+    let four: CompactBvh4 = Builder::new().build_compact(&mesh).unwrap();
+    // The tree alone, then the mesh with it.
+    there_and_back(&eight, |bytes| {
+        let opened = Bvh::<CompactNode8, RunLeaf, Borrowed>::from_bytes(bytes).unwrap();
+        let opened = opened.over(&mesh).unwrap();
+        for ray in &scene.rays {
+            assert_eq!(bits(opened.closest_hit(ray)), bits(full.closest_hit(ray)));
+        }
+    });
+    there_and_back(&eight.over(&mesh).unwrap(), |bytes| {
+        let opened = MeshBvh8::from_bytes(bytes).unwrap();
+        for ray in &scene.rays {
+            assert_eq!(bits(opened.closest_hit(ray)), bits(full.closest_hit(ray)));
+            assert_eq!(opened.any_hit(ray), full.any_hit(ray));
+        }
+    });
+    there_and_back(&four.over(&mesh).unwrap(), |bytes| {
+        let opened = MeshBvh4::from_bytes(bytes).unwrap();
+        for ray in &scene.rays {
+            assert_eq!(bits(opened.closest_hit(ray)), bits(full.closest_hit(ray)));
+        }
+    });
+}
+
+#[test]
+fn boxes_there_and_back() {
+    let aabbs: Vec<Aabb> = (0..100u8)
+        .map(|i| {
+            let at = glam::Vec3::splat(f32::from(i));
+            Aabb::new(at, at + 1.5)
+        })
+        .collect();
+    let bvh = Builder::new().build_primitives::<Node4>(&aabbs).unwrap();
+    there_and_back(&bvh, |bytes| {
+        let opened = Bvh::<Node4, PrimitiveLeaf, Borrowed>::from_bytes(bytes).unwrap();
+        assert_eq!(opened.primitives(), bvh.primitives());
+    });
+}
+
+#[test]
+fn nothing_there_and_back() {
+    let mesh = TriangleMesh::new::<f32, u32>(&[], &[]).unwrap();
+    let compact: CompactBvh8 = Builder::new().build_compact(&mesh).unwrap();
+    there_and_back(&compact.over(&mesh).unwrap(), |bytes| {
+        let opened = MeshBvh8::from_bytes(bytes).unwrap();
+        assert_eq!(opened.closest_hit(&Ray::new([0.0; 3], [1.0; 3])), None);
+    });
+}
+
+/// A file of a few triangles, and its mesh.
+fn small() -> (Scene, Vec<u8>) {
+    let scene = Scene::new(20);
+    let compact: CompactBvh4 = Builder::new().build_compact(&scene.mesh()).unwrap();
+    let bytes = compact.over(&scene.mesh()).unwrap().to_bytes().unwrap();
+    (scene, bytes)
+}
+
+#[test]
+fn one_byte_changed() {
+    let (_, bytes) = small();
+    let mut blocks = aligned(&bytes);
+    for at in 0..bytes.len() {
+        for change in [1, 0x80, 0xff] {
+            blocks[at / 64].0[at % 64] ^= change;
+            let opened = MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len()));
+            assert!(opened.is_err(), "byte {at} changed by {change:#x}");
+            blocks[at / 64].0[at % 64] ^= change;
+        }
+    }
+    assert!(MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len())).is_ok());
+}
+
+/// What is changed and sealed again is no accident. It is opened or not, and if it is, it answers.
+#[test]
+fn one_byte_changed_and_sealed() {
+    let (scene, bytes) = small();
+    let (mut opened, mut refused) = (0, 0);
+    for at in 0..bytes.len() {
+        for change in [1, 0x10, 0x80, 0xff] {
+            let mut changed = bytes.clone();
+            changed[at] ^= change;
+            seal(&mut changed);
+            match MeshBvh4::from_bytes(bytes_of(&aligned(&changed), changed.len())) {
+                Ok(bvh) => {
+                    opened += 1;
+                    for ray in &scene.rays {
+                        assert_eq!(bvh.any_hit(ray), bvh.closest_hit(ray).is_some(), "{at}");
+                    }
+                }
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(opened > 1000 && refused > 1000, "{opened}, {refused}");
+}
+
+#[test]
+fn cut_off() {
+    let (_, bytes) = small();
+    let blocks = aligned(&bytes);
+    for len in 0..bytes.len() {
+        assert!(MeshBvh4::from_bytes(bytes_of(&blocks, len)).is_err());
+    }
+    let longer = [bytes.as_slice(), &[0; 64]].concat();
+    let blocks = aligned(&longer);
+    let opened = MeshBvh4::from_bytes(bytes_of(&blocks, longer.len()));
+    assert_eq!(
+        opened.err(),
+        Some(BytesError::Length {
+            expected: bytes.len() as u64,
+            found: longer.len()
+        })
+    );
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    fn error<'a, N: WideNode, L: Open<'a>>(bytes: &'a [u8]) -> Option<BytesError> {
+        Bvh::<N, L, Borrowed>::from_bytes(bytes).err()
+    }
+    let (scene, bytes) = small();
+    let blocks = aligned(&bytes);
+    let whole = bytes_of(&blocks, bytes.len());
+    assert_eq!(
+        error::<CompactNode8, RunLeaf>(whole),
+        Some(BytesError::Nodes {
+            expected: 4,
+            found: 3
+        })
+    );
+    assert_eq!(
+        error::<CompactNode4, TriangleLeaf>(whole),
+        Some(BytesError::Leaves {
+            expected: 1,
+            found: 3
+        })
+    );
+    assert_eq!(
+        error::<CompactNode4, RunLeaf>(&whole[..7]),
+        Some(BytesError::NoHeader(7))
+    );
+    let changed = |at: usize, to: &[u8]| {
+        let mut changed = bytes.clone();
+        changed[at..at + to.len()].copy_from_slice(to);
+        seal(&mut changed);
+        let blocks = aligned(&changed);
+        error::<CompactNode4, MeshLeaf>(bytes_of(&blocks, changed.len()))
+    };
+    assert_eq!(changed(0, b"x"), Some(BytesError::NotAHierarchy));
+    // The byte order's mark, as the other kind of machine writes it.
+    let swapped = 0x0102_0304_u32.swap_bytes().to_ne_bytes();
+    assert_eq!(changed(8, &swapped), Some(BytesError::ByteOrder));
+    assert_eq!(
+        changed(12, &9_u32.to_ne_bytes()),
+        Some(BytesError::Version(9))
+    );
+    // A tree without its mesh is not one over it.
+    let compact: CompactBvh4 = Builder::new().build_compact(&scene.mesh()).unwrap();
+    let tree = compact.to_bytes().unwrap();
+    assert!(matches!(
+        error::<CompactNode4, MeshLeaf>(bytes_of(&aligned(&tree), tree.len())),
+        Some(BytesError::MeshTooSmall(small)) if small.triangles == 0 && small.needed == 20
+    ));
+    // A full hierarchy has to be where its leaves may be.
+    let full = Builder::new()
+        .build(&scene.mesh())
+        .unwrap()
+        .to_bytes()
+        .unwrap();
+    let blocks = aligned(&[&[0; 4], full.as_slice()].concat());
+    let shifted = &bytes_of(&blocks, full.len() + 4)[4..];
+    assert!(matches!(
+        error::<Node8, TriangleLeaf>(shifted),
+        Some(BytesError::Misaligned { needed: 32 | 64 })
+    ));
+}
