@@ -3,7 +3,7 @@
 #[path = "../../tests/vectors/file.rs"]
 mod file;
 
-use bytemuck::{Pod, cast_slice};
+use bytemuck::cast_slice;
 use std::{env, error::Error, fs, path::PathBuf};
 use wide_bvh::{build::Builder, geometry::TriangleMesh, layout::CompactBvh4};
 
@@ -24,18 +24,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .iter()
         .map(|&hit| file::bits(hit).unwrap_or([u32::MAX; 4]))
         .collect();
-    let write = |name: &str, bytes: &[u8]| fs::write(out.join(name).with_extension("bin"), bytes);
-    write("positions", bytes(&vectors.positions))?;
-    write("indices", bytes(&vectors.indices))?;
-    write("rays", bytes(&vectors.rays))?;
-    write("hits", bytes(&hits))?;
-    write("nodes", bytes(bvh.nodes()))?;
-    write("primitives", bytes(bvh.primitives()))?;
-    write("bounds", bytes(&[*bvh.bounds()]))?;
+    fs::write(out.join("scene.bin"), bvh.over(&mesh)?.to_bytes()?)?;
+    // As both machines have them: little-endian.
+    fs::write(out.join("rays.bin"), cast_slice::<_, u8>(&vectors.rays))?;
+    fs::write(out.join("hits.bin"), cast_slice::<_, u8>(&hits))?;
     Ok(())
-}
-
-/// As both machines have them: little-endian.
-fn bytes<T: Pod>(items: &[T]) -> &[u8] {
-    cast_slice(items)
 }

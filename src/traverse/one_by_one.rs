@@ -80,7 +80,6 @@ mod tests {
     };
     use fastrand::Rng;
     use glam::Vec3;
-    use std::boxed::Box;
     use wide_bvh_scenes::shapes;
 
     /// Targets that have vectors never come here but in this test.
@@ -99,11 +98,11 @@ mod tests {
             let compact_eight: CompactBvh8 = builder.build_compact(&view).unwrap();
             let over_four = compact_four.over(&view).unwrap();
             let over_eight = compact_eight.over(&view).unwrap();
-            let layouts: [Box<dyn Fn(&Ray, bool) -> Option<Hit>>; 4] = [
-                Box::new(|ray, any| find(&four, ray, any)),
-                Box::new(|ray, any| find(&eight, ray, any)),
-                Box::new(|ray, any| find(&over_four, ray, any)),
-                Box::new(|ray, any| find(&over_eight, ray, any)),
+            let layouts: [&dyn Fn(&Ray, bool) -> Option<Hit>; 4] = [
+                &|ray, any| find(&four, ray, any),
+                &|ray, any| find(&eight, ray, any),
+                &|ray, any| find(&over_four, ray, any),
+                &|ray, any| find(&over_eight, ray, any),
             ];
             for number in 0..4000 {
                 let mut point = || Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 12.0 - 3.0;
@@ -123,7 +122,7 @@ mod tests {
                 let bits = |hit: Option<Hit>| {
                     hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive])
                 };
-                for layout in &layouts {
+                for layout in layouts {
                     assert_eq!(bits(layout(&ray, false)), bits(expected), "{ray:?}");
                     assert_eq!(layout(&ray, true).is_some(), expected.is_some(), "{ray:?}");
                 }

@@ -52,6 +52,7 @@ impl Vectors {
         }
     }
 
+    #[allow(dead_code, reason = "not all who read write")]
     pub fn to_bytes(&self) -> Vec<u8> {
         let counts = [self.positions.len(), self.indices.len(), self.rays.len()];
         let mut words: Vec<u32> = counts.map(|count| count as u32).to_vec();

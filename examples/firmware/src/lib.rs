@@ -1,10 +1,7 @@
 #![no_std]
 //! What lies in flash, and the hierarchy over it: nothing is copied.
 
-use wide_bvh::{
-    geometry::{Aabb, Ray, TriangleMesh},
-    layout::CompactBvh4Ref,
-};
+use wide_bvh::{geometry::Ray, layout::MeshBvh4};
 
 /// As aligned as anything that is baked has to be.
 #[repr(C, align(64))]
@@ -18,29 +15,21 @@ macro_rules! baked {
             $name,
             ".bin"
         )));
-        bytemuck::cast_slice(&BYTES.0)
+        &BYTES.0
     }};
 }
 
-/// The hierarchy, checked once. `None` if what was baked is none.
-pub fn open() -> Option<CompactBvh4Ref<'static>> {
-    let bounds: &[Aabb] = baked!("bounds");
-    CompactBvh4Ref::from_parts(baked!("nodes"), (), baked!("primitives"), *bounds.first()?).ok()
-}
-
-/// The mesh that it is over. `None` if what was baked is none.
-pub fn mesh() -> Option<TriangleMesh<'static>> {
-    let positions: &[[f32; 3]] = baked!("positions");
-    let indices: &[[u32; 3]] = baked!("indices");
-    TriangleMesh::new(positions, indices).ok()
+/// The hierarchy and the mesh that it is over, checked once. `None` if what was baked is none.
+pub fn open() -> Option<MeshBvh4<'static>> {
+    MeshBvh4::from_bytes(baked!("scene")).ok()
 }
 
 /// Rays of every kind.
 pub fn rays() -> &'static [Ray] {
-    baked!("rays")
+    bytemuck::cast_slice(baked!("rays"))
 }
 
 /// Their hits, as bits: `t`, `u`, `v` and the triangle's number, all bits set for a miss.
 pub fn hits() -> &'static [[u32; 4]] {
-    baked!("hits")
+    bytemuck::cast_slice(baked!("hits"))
 }

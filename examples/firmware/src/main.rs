@@ -8,7 +8,7 @@ mod stack;
 
 use cortex_m_rt::entry;
 use semihosting::{println, process};
-use wide_bvh_firmware::{hits, mesh, open, rays};
+use wide_bvh_firmware::{hits, open, rays};
 
 #[entry]
 fn main() -> ! {
@@ -23,8 +23,7 @@ fn main() -> ! {
 
 /// How many rays are answered in another way than on the host. `None` if there is no scene.
 fn run() -> Option<usize> {
-    let (mesh, bvh) = (mesh()?, open()?);
-    let bvh = bvh.over(&mesh).ok()?;
+    let bvh = open()?;
     picture::draw(&bvh);
 
     let (mut wrong, mut found) = (0, 0);
@@ -46,7 +45,7 @@ fn run() -> Option<usize> {
     }
     println!(
         "{} triangles, {} rays, {found} hits, {wrong} other than the host's",
-        mesh.len(),
+        bvh.primitives().len(),
         rays().len()
     );
     Some(wrong)

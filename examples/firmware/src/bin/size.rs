@@ -16,10 +16,8 @@ fn main() -> ! {
 #[cfg(feature = "open")]
 fn run() -> Option<()> {
     use core::hint::black_box;
-    use wide_bvh_firmware::{mesh, open};
 
-    let (mesh, bvh) = (mesh()?, open()?);
-    let bvh = bvh.over(&mesh).ok()?;
+    let bvh = wide_bvh_firmware::open()?;
     black_box(&bvh);
     #[cfg(feature = "queries")]
     {
