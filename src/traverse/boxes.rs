@@ -6,20 +6,26 @@ use crate::{
     simd::{F32x1, Lanes, Portable, Simd},
     slab::RaySlabs,
 };
+use core::mem::MaybeUninit;
 use glam::Vec3;
 
 /// A ray in terms of nodes `N`.
 pub(super) trait Boxes<N: WideNode> {
     /// From which `t` on the ray is in the boxes, as it comes.
     type Near: Copy;
-    /// The same, a number a child.
-    type Nears: AsRef<[f32]>;
+    /// The same, to be taken from.
+    type Nears;
 
     /// By how much the greatest `t` is to be raised.
     fn margin(&self) -> f32;
     /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
     fn test(&self, node: &N, t_max: f32) -> (u32, Self::Near);
     fn nears(near: Self::Near) -> Self::Nears;
+    /// From which `t` on the ray is in a child's box.
+    ///
+    /// # Safety
+    /// The child has a bit in the mask.
+    unsafe fn near(nears: &Self::Nears, lane: usize) -> f32;
 }
 
 /// All at once.
@@ -56,6 +62,12 @@ impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<T, N> {
     fn nears(near: N::Lanes<T>) -> Self::Nears {
         near.to_array()
     }
+
+    #[inline(always)]
+    unsafe fn near(nears: &Self::Nears, lane: usize) -> f32 {
+        // SAFETY: the mask has bits for the node's lanes alone, `nears` is of as many.
+        unsafe { *nears.as_ref().get_unchecked(lane) }
+    }
 }
 
 /// One by one.
@@ -78,8 +90,9 @@ impl OneByOne {
 }
 
 impl<N: WideNode> Boxes<N> for OneByOne {
-    type Near = [f32; Self::MOST];
-    type Nears = [f32; Self::MOST];
+    // Nothing is cleared, which would be a call.
+    type Near = [MaybeUninit<f32>; Self::MOST];
+    type Nears = Self::Near;
 
     #[inline(always)]
     fn margin(&self) -> f32 {
@@ -89,13 +102,13 @@ impl<N: WideNode> Boxes<N> for OneByOne {
     #[inline(always)]
     fn test(&self, node: &N, t_max: f32) -> (u32, Self::Near) {
         const { assert!(N::WIDTH <= Self::MOST) };
-        let (mut mask, mut nears) = (0, [0.0; Self::MOST]);
+        let (mut mask, mut nears) = (0, [MaybeUninit::uninit(); Self::MOST]);
         for lane in 0..node.lanes() {
             let planes = node.child_planes(lane, self.direction);
             let [near, far] = planes.map(|sides| sides.map(F32x1));
             let (hit, near) = self.slabs.between(near, far, F32x1(t_max));
             mask |= hit.bits() << lane;
-            nears[lane % Self::MOST] = near.0;
+            nears[lane % Self::MOST] = MaybeUninit::new(near.0);
         }
         (mask, nears)
     }
@@ -103,5 +116,11 @@ impl<N: WideNode> Boxes<N> for OneByOne {
     #[inline(always)]
     fn nears(near: Self::Near) -> Self::Nears {
         near
+    }
+
+    #[inline(always)]
+    unsafe fn near(nears: &Self::Nears, lane: usize) -> f32 {
+        // SAFETY: where the mask has a bit, the number was written.
+        unsafe { nears.get_unchecked(lane).assume_init() }
     }
 }

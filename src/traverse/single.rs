@@ -109,10 +109,8 @@ pub(super) fn walk_boxes<
                 continue;
             }
             let near = B::nears(near);
-            // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
-            let entry = |lane: usize| unsafe {
-                Entry::new(*near.as_ref().get_unchecked(lane), node.link(lane))
-            };
+            // SAFETY: `mask` has a bit for the lane, and bits for the node's lanes alone.
+            let entry = |lane: usize| unsafe { Entry::new(B::near(&near, lane), node.link(lane)) };
             let mut nearest = entry(first);
             let base = len;
             loop {
