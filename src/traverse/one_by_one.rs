@@ -22,7 +22,8 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
     ray: &Ray,
     any: bool,
 ) -> Option<Hit> {
-    let mut room = PreparedRay::ROOM;
+    // Any ray is room for one. To clear it would be a call.
+    let mut room = *ray;
     let prepared = PreparedRay::new(ray, &mut room)?;
     if bvh.root() == Child::EMPTY {
         return None;

@@ -13,7 +13,9 @@ fn main() -> ! {
     core::hint::black_box(wide_bvh_firmware::open());
     #[cfg(feature = "queries")]
     queries();
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 #[cfg(feature = "queries")]
