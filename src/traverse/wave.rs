@@ -19,7 +19,7 @@ use crate::{
     simd::{Lanes, Simd},
     slab::{NarrowSlabs, PreparedRay, SceneExtent},
 };
-use core::{hint::select_unpredictable, mem::MaybeUninit};
+use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
 
 /// The most lanes of a wave.
 const MOST_LANES: usize = 64;
@@ -274,10 +274,10 @@ impl Lane {
         self.top = (self.top + mask.count_ones() as usize).wrapping_sub(1);
 
         // Not by a branch, nor anything that may become one.
-        let node = nodes as usize + self.current.node_offset();
-        let leaf = leaves as usize + self.current.leaf() * size_of::<TriangleLeaf>();
+        let node = nodes.addr() + self.current.node_offset();
+        let leaf = leaves.addr() + self.current.leaf() * size_of::<TriangleLeaf>();
         let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
-        token.prefetch((node ^ ((node ^ leaf) & is_leaf)) as *const u8);
+        token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
     }
 
     /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
