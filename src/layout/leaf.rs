@@ -126,6 +126,16 @@ impl Triangles for &TriangleLeaf {
             self.corners_of(vertices.z),
         ]
     }
+
+    #[inline(always)]
+    fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
+        let [x, y, z] = &self.vertices;
+        self.corners.each_ref().map(|corners| {
+            let vertex =
+                corners[lane % TriangleLeaf::MAX_TRIANGLES] as usize % TriangleLeaf::MAX_VERTICES;
+            [x[vertex], y[vertex], z[vertex]]
+        })
+    }
 }
 
 impl Leaf for TriangleLeaf {

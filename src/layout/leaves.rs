@@ -99,6 +99,8 @@ pub trait Triangles: Copy {
     fn count(self) -> usize;
     /// Their corners as the ray sees them. What stands in lanes past the last triangle is finite if they all are.
     fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8>;
+    /// The corners of the triangle in a lane, of which there are [`count`](Self::count).
+    fn triangle(self, lane: usize) -> [[f32; 3]; 3];
 
     /// A bit for each triangle there is.
     #[inline(always)]

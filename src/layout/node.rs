@@ -27,6 +27,10 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// left out.
     fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self;
 
+    /// How many lanes may have a child.
+    #[doc(hidden)]
+    fn lanes(&self) -> usize;
+
     /// What a lane leads to. Nothing past the last.
     fn child(&self, lane: usize) -> Child;
 
@@ -105,6 +109,11 @@ macro_rules! impl_wide_node {
 
             fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
                 Self::new(children)
+            }
+
+            #[inline(always)]
+            fn lanes(&self) -> usize {
+                self.lanes()
             }
 
             #[inline]

@@ -140,6 +140,22 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
         }
         corners
     }
+
+    #[inline(always)]
+    fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
+        let (indices, positions) = (self.of.indices(), self.of.positions());
+        let Range { start, end } = self.range();
+        // SAFETY: as above.
+        unsafe {
+            let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
+            let [a, b, c] = *indices.get_unchecked(number as usize);
+            [
+                *positions.get_unchecked(a as usize),
+                *positions.get_unchecked(b as usize),
+                *positions.get_unchecked(c as usize),
+            ]
+        }
+    }
 }
 
 impl<N: WideNode, S: Storage> Bvh<N, RunLeaf, S> {

@@ -16,7 +16,7 @@ use core::ops::{Mul, Sub};
 
 use crate::{
     geometry::Ray,
-    simd::{Vector, splat3},
+    simd::{F32x1, Portable, Vector, splat3},
     slab::{CONDITION, PreparedRay, UNIT_ROUNDOFF, pow2},
 };
 
@@ -174,6 +174,30 @@ impl<'a, V: Copy> RayShear<'a, V> {
             reciprocal: self.reciprocal,
             t_min: V::splat(token, self.ray.t_min),
         }
+    }
+}
+
+impl RayShear<'_, F32x1> {
+    /// One triangle: `t`, `u` and `v` if it is hit within the ray's range up to `t_max`.
+    ///
+    /// A call, for there to be one of it.
+    #[inline(never)]
+    pub(crate) fn test_triangle(&self, corners: &[[f32; 3]; 3], t_max: f32) -> Option<[f32; 3]> {
+        let token = Portable;
+        let [a, b, c] = corners;
+        let (a, b, c) = (
+            self.shear(token, splat3(token, *a)),
+            self.shear(token, splat3(token, *b)),
+            self.shear(token, splat3(token, *c)),
+        );
+        let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
+        let along = self.along(token);
+        let edges = along.edges::<1>(token, corners, 1);
+        if edges.candidates == 0 {
+            return None;
+        }
+        let hit = along.test::<1, true>(token, corners, edges, F32x1(t_max))?;
+        Some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
 

@@ -8,6 +8,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod backend;
+mod one;
 mod portable;
 mod vector;
 
@@ -17,5 +18,6 @@ pub(crate) use avx2::Avx2;
 pub(crate) use avx512::Avx512;
 pub use backend::Backend;
 pub(crate) use backend::Operation;
+pub(crate) use one::F32x1;
 pub(crate) use portable::Portable;
 pub(crate) use vector::{Lanes, Simd, Vector, splat3};

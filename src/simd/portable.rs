@@ -11,6 +11,13 @@ impl Simd for Portable {
     type F32x4 = f32x4;
     type F32x8 = f32x8;
 
+    // What `wide` has vectors for.
+    const ONE_BY_ONE: bool = !cfg!(any(
+        target_feature = "sse",
+        target_feature = "simd128",
+        all(target_feature = "neon", target_arch = "aarch64")
+    ));
+
     #[inline(always)]
     fn low(vector: f32x8) -> f32x4 {
         let [a, b, c, d, ..] = vector.to_array();

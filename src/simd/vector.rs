@@ -14,6 +14,9 @@ pub trait Simd: Copy {
     /// Eight floats.
     type F32x8: Vector<8, Token = Self>;
 
+    /// Whether triangles are tested one by one, since the target has no vectors: faster there, and less code.
+    const ONE_BY_ONE: bool = false;
+
     /// The first four of eight.
     fn low(vector: Self::F32x8) -> Self::F32x4;
 

@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Lanes, Portable, Vector, splat3},
+    simd::{Lanes, Portable, Simd, Vector, splat3},
 };
 
 /// A ray that can hit something, in numbers that the kernels can work with.
@@ -175,6 +175,9 @@ pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
 fn is_finite(ray: &Ray) -> bool {
     // 0 times a finite number is 0, times any other NaN. The last two lanes are the range of t.
     let lanes: &[f32; 8] = bytemuck::cast_ref(ray);
+    if Portable::ONE_BY_ONE {
+        return lanes[..6].iter().all(|x| x * 0.0 == 0.0);
+    }
     let zero = wide::f32x8::splat(0.0);
     let zeros = wide::f32x8::load(Portable, lanes) * zero;
     Vector::<8>::le(zeros, zero).bits() & 0b11_1111 == 0b11_1111

@@ -5,9 +5,11 @@
 //! are the same bits.
 
 mod batch;
+mod boxes;
 mod bundle;
 mod classes;
 mod count;
+mod one_by_one;
 mod primitives;
 mod query;
 mod single;

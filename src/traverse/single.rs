@@ -1,9 +1,10 @@
 //! The walk of one ray through a hierarchy.
 
+use super::boxes::{AtOnce, Boxes};
 use crate::{
     geometry::Ray,
     layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
-    simd::{Lanes, Simd},
+    simd::Simd,
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
 
@@ -60,10 +61,29 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
     if bvh.root() == Child::EMPTY {
         return;
     }
+    let boxes = AtOnce::new(token, ray, reciprocal, bvh.bounds());
+    walk_boxes(token, bvh, &boxes, ray.t_max, visitor);
+}
+
+/// [`walk`], however boxes are tested. `bvh` is not empty.
+#[inline(always)]
+pub(super) fn walk_boxes<
+    T: Simd,
+    N: WideNode,
+    L: Leaves,
+    S: Storage,
+    B: Boxes<N>,
+    V: Visitor<L>,
+>(
+    token: T,
+    bvh: &Bvh<N, L, S>,
+    boxes: &B,
+    t_max: f32,
+    visitor: &mut V,
+) {
     let nodes = bvh.nodes().as_ptr();
-    let slabs = N::slabs(token, ray, reciprocal, bvh.bounds());
-    let margin = N::margin(&slabs);
-    let mut t_max = ray.t_max + margin;
+    let margin = boxes.margin();
+    let mut t_max = t_max + margin;
     // Apart, so that the length stays in a register and nothing is cleared.
     let mut stack: Stack = [MaybeUninit::uninit(); STACK];
     let mut len = 0;
@@ -73,8 +93,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
             let node = unsafe { &*nodes.byte_add(current.node_offset()) };
-            let (hit, near) = node.test(token, &slabs, N::Lanes::<T>::splat(token, t_max));
-            let mut mask = hit.bits();
+            let (mut mask, near) = boxes.test(node, t_max);
             if mask == 0 {
                 match pop(&stack, &mut len, t_max) {
                     Some(link) => current = link,
@@ -89,7 +108,7 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
             if mask == 0 {
                 continue;
             }
-            let near = near.to_array();
+            let near = B::nears(near);
             // SAFETY: `mask` has bits for the node's lanes alone, `near` is of as many.
             let entry = |lane: usize| unsafe {
                 Entry::new(*near.as_ref().get_unchecked(lane), node.link(lane))

@@ -3,6 +3,7 @@
 use super::{
     Counts,
     count::Counting,
+    one_by_one,
     single::{Visitor, walk},
 };
 use crate::{
@@ -87,17 +88,27 @@ impl Found {
                 v: v[lane],
                 place: leaf.first() + lane,
             };
-            let closer = best.is_none_or(|best| {
-                found.t < best.t
-                    || found.t == best.t && primitives[found.place] < primitives[best.place]
-            });
-            if closer {
-                *t_max = found.t;
-                *best = Some(found);
-                any_closer = true;
-            }
+            any_closer |= found.compare(best, t_max, primitives);
         }
         any_closer
+    }
+
+    /// Becomes the best one if it is. Whether it did.
+    #[inline(always)]
+    pub(super) fn compare(
+        self,
+        best: &mut Option<Self>,
+        t_max: &mut f32,
+        primitives: &[u32],
+    ) -> bool {
+        let closer = best.is_none_or(|best| {
+            self.t < best.t || self.t == best.t && primitives[self.place] < primitives[best.place]
+        });
+        if closer {
+            *t_max = self.t;
+            *best = Some(self);
+        }
+        closer
     }
 
     /// In the caller's terms.
@@ -122,6 +133,9 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Closest<'_, N, L,
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) -> Option<Hit> {
+        if T::ONE_BY_ONE {
+            return one_by_one::find(self.bvh, self.ray, false);
+        }
         let mut room = PreparedRay::ROOM;
         let prepared = PreparedRay::new(self.ray, &mut room)?;
         let reciprocal = prepared.reciprocals(token);
@@ -166,6 +180,9 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Any<'_, N, L, S> 
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) -> bool {
+        if T::ONE_BY_ONE {
+            return one_by_one::find(self.bvh, self.ray, true).is_some();
+        }
         let mut room = PreparedRay::ROOM;
         let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
             return false;
