@@ -272,11 +272,7 @@ fn tinybvh_138_few_triangles() {
 fn parry_444_no_holes_in_a_picture() {
     let mesh = shapes::icosphere(4);
     let scene = Variants::new(mesh.positions, mesh.indices);
-<<<<<<< HEAD
-    let size = part(128).max(32) as i32;
-=======
-    let (size, mut hits) = (128, 0);
->>>>>>> 051b3e7157afacec71d5bdfc0b295b11c7f6f853
+    let (size, mut hits) = (part(128).max(32) as i32, 0);
     for y in 0..size {
         for x in 0..size {
             let pixel = |i: i32| (i as f32 + 0.5) / size as f32 * 2.4 - 1.2;
@@ -294,7 +290,9 @@ fn parry_444_no_holes_in_a_picture() {
             }
         }
     }
-    assert_eq!(hits, 8_920);
+    if size == 128 {
+        assert_eq!(hits, 8_920);
+    }
 }
 
 /// nanort #30: a direction component of -5.3e-17 turns a hit into a miss.

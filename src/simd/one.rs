@@ -103,6 +103,10 @@ impl Vector<1> for F32x1 {
         Self::of_mask(self.0 <= other.0)
     }
     #[inline(always)]
+    fn eq(self, other: Self) -> Self {
+        Self::of_mask(self.0 == other.0)
+    }
+    #[inline(always)]
     fn select(self, yes: Self, no: Self) -> Self {
         if self.bits() != 0 { yes } else { no }
     }
