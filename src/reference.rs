@@ -40,7 +40,7 @@ pub fn any_hit(mesh: &TriangleMesh, ray: &Ray) -> bool {
     })
 }
 
-/// The closest hit on `count` primitives of a caller's own.
+/// The closest hit on `count` primitives of a caller's own. Those with a box that is empty or not finite are never hit.
 pub fn closest_primitive<P: Primitives + ?Sized>(
     primitives: &P,
     count: u32,

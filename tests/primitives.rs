@@ -101,6 +101,28 @@ proptest! {
     }
 }
 
+/// Whatever its own test says.
+#[test]
+fn what_has_no_box_is_never_hit() {
+    let place = Aabb::new(Vec3::splat(-1.0), Vec3::splat(1.0));
+    let endless = Aabb::new(Vec3::splat(-1.0), Vec3::INFINITY);
+    let liar = Liar(vec![Aabb::EMPTY, place, endless, Aabb::EMPTY]);
+    let builder = Builder::new().drop_non_finite(true);
+    let bvh: Bvh<Node8, _, _> = builder.build_primitives(&liar.0).unwrap();
+    let mut hits = 0;
+    for i in 0..100 {
+        let ray = Ray::new(
+            [-9.0, 0.02 * i as f32, 0.0],
+            [1.0 + 0.01 * i as f32, 0.0, 0.0],
+        );
+        let hit = bvh.closest_hit(&liar, &ray);
+        assert_eq!(hit, reference::closest_primitive(&liar, 4, &ray));
+        assert!(hit.is_none_or(|hit| hit.primitive == 1));
+        hits += usize::from(hit.is_some());
+    }
+    assert!((5..95).contains(&hits), "{hits} hits");
+}
+
 #[test]
 fn a_sphere_is_hit_where_it_is() {
     let spheres = [

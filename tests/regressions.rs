@@ -1,4 +1,7 @@
 //! Failures that users of other ray tracers reported, each with the tracker's number.
+//!
+//! *Exactly*: the answer in rationals, of the float ray and the float corners, by the definitions in `benches/lab/src/exact`.
+//! Where it says so of all rays, brute force was compared with it ray by ray.
 
 mod common;
 
@@ -30,6 +33,8 @@ fn quad(half: f32) -> Variants {
 
 /// Embree #181, #174: rays are lost through vertices in robust mode. A fan of triangles around one vertex,
 /// seen from many sides: each ray at the vertex has to hit.
+///
+/// Exactly: all 5,000 rays hit, at t from 1 - 6.1e-8 to 1 + 4.9e-8, the direction being rounded. Computed t are off by 1.1e-7.
 #[test]
 fn embree_181_174_rays_at_a_vertex() {
     let spokes = 24;
@@ -48,12 +53,15 @@ fn embree_181_174_rays_at_a_vertex() {
         let away = Vec3::new(random.f32() - 0.5, random.f32() - 0.5, 0.6 + random.f32());
         let origin = vertex + away * 10f32.powf(random.f32() * 6.0 - 3.0);
         let hit = hit(&scene, Ray::new(origin, vertex - origin)).expect("a hit at the vertex");
-        assert!((hit.t - 1.0).abs() < 1e-4, "{hit:?}");
+        assert!((hit.t - 1.0).abs() < 2e-7, "{hit:?}");
     }
 }
 
 /// Embree #387: in robust mode a hit is reported at t = 12291 on a triangle 600 away, seen at half a
 /// degree, with edges of 11.2, 9.7 and 1.4. Any hit must be on the triangle.
+///
+/// Exactly: 19,009 of the 20,000 rays hit, the same as by brute force, at t from 588.918 to 611.147. Computed t are off by
+/// 1.3e-4, 2.1e-7 of themselves. The rest start in the triangle's plane, or are rounded off its edge.
 #[test]
 fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
     let mut random = fastrand::Rng::with_seed(common::SEED);
@@ -73,14 +81,18 @@ fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
         let target = corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
         if let Some(hit) = hit(&scene, Ray::new(Vec3::ZERO, target.normalize())) {
             hits += 1;
-            assert!((585.0..615.0).contains(&hit.t), "{hit:?} on {corners:?}");
+            assert!((588.9..611.2).contains(&hit.t), "{hit:?} on {corners:?}");
         }
     }
-    assert!(hits > part(10_000), "only {hits} hits");
+    // Sines are rounded otherwise elsewhere.
+    assert!((part(18_950)..part(19_070)).contains(&hits), "{hits} hits");
 }
 
 /// Embree #423: SSE2, SSE4.2 and AVX report a hit that AVX2 does not. Rays that graze edges, on every
 /// backend: `check` compares them all with the reference.
+///
+/// Exactly: 10,185 of the 20,000 rays hit, at t from 1 - 1.6e-7 to 1 + 1.8e-7. By brute force 10,034 do: 1,480 of those and 1,329
+/// others, the line passing the edge nearer than a corner's rounding when it is seen from the ray.
 #[test]
 fn embree_423_backends_agree_at_edges() {
     let scene = one_triangle([[0.1, 0.2, 1.0], [0.9, 0.3, 1.1], [0.4, 0.8, 0.9]]);
@@ -94,6 +106,9 @@ fn embree_423_backends_agree_at_edges() {
         let nudge = Vec3::splat((random.f32() - 0.5) * 1e-7);
         hits += usize::from(hit(&scene, Ray::new(origin, edge + nudge - origin)).is_some());
     }
+    if part(20_000) == 20_000 {
+        assert_eq!(hits, 10_034);
+    }
     assert!(
         (part(5_000)..part(15_000)).contains(&hits),
         "{hits} of {} at an edge",
@@ -102,6 +117,8 @@ fn embree_423_backends_agree_at_edges() {
 }
 
 /// Embree #416: hits that are not there, when coordinates differ by 60,000 times.
+///
+/// Exactly: all 20,000 rays miss.
 #[test]
 fn embree_416_no_phantoms_between_large_and_small() {
     let scene = one_triangle([[0.0, 0.0, 0.0], [60_000.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
@@ -122,26 +139,39 @@ fn embree_416_no_phantoms_between_large_and_small() {
 
 /// Embree #133: a ray that starts on a surface. With t from 0 on, the surface itself is hit at 0; behind the
 /// start nothing is, and from t just above 0 on the surface is not hit again.
+///
+/// Exactly: triangle 0 at t = 0, u = 3/8, v = 3/16, whatever the direction; a miss from 2^-126 on.
 #[test]
 fn embree_133_from_on_a_surface() {
     let scene = quad(10.0);
     for direction in [Vec3::Y, Vec3::NEG_Y, Vec3::new(0.3, 1.0, -0.2)] {
         let ray = Ray::new([1.25, 0.0, -2.5], direction);
-        assert_eq!(hit(&scene, ray).expect("the surface").t, 0.0);
+        let surface = Hit {
+            t: 0.0,
+            u: 0.375,
+            v: 0.1875,
+            primitive: 0,
+        };
+        assert_eq!(hit(&scene, ray), Some(surface));
         let beyond = ray.with_range(f32::MIN_POSITIVE, f32::INFINITY);
         assert_eq!(hit(&scene, beyond), None);
     }
 }
 
 /// Embree #589: 0·∞ in the box test, for a ray parallel to a slab whose origin lies in its plane.
+///
+/// Exactly: at y = 0 triangle 8 at t = 1, u = 1/2, v = 0, its edge; at y = 1 triangle 9 at t = 1, u = v = 1/2; beside the box a
+/// miss. -0 as 0.
 #[test]
 fn embree_589_parallel_to_a_slab() {
     let mesh = shapes::cuboid([0.0; 3], [1.0; 3]);
     let scene = Variants::new(mesh.positions, mesh.indices);
     for zero in [0.0, -0.0] {
-        for y in [0.0, 1.0] {
+        for (y, v, primitive) in [(0.0, 0.0, 8), (1.0, 0.5, 9)] {
             let ray = Ray::new([-1.0, y, 0.5], [1.0, zero, zero]);
-            assert_eq!(hit(&scene, ray).expect("the edge").t, 1.0);
+            let (t, u) = (1.0, 0.5);
+            let edge = Hit { t, u, v, primitive };
+            assert_eq!(hit(&scene, ray), Some(edge));
         }
         for y in [-0.001, 1.001] {
             let ray = Ray::new([-1.0, y, 0.5], [1.0, zero, zero]);
@@ -152,6 +182,9 @@ fn embree_589_parallel_to_a_slab() {
 
 /// tinybvh #168: not watertight on a mesh quantised to an integer grid, for rays along an axis. From
 /// outside, at every grid point well within the silhouette.
+///
+/// Exactly: all 3,942 rays hit, at t from 32 to 41.5, 2,382 of them more than one triangle at a time; all computed t are the
+/// exact ones or floats next to them.
 #[test]
 fn tinybvh_168_rays_along_an_axis_at_a_quantised_mesh() {
     let mesh = shapes::quantised(shapes::icosphere(3), 32);
@@ -174,27 +207,36 @@ fn tinybvh_168_rays_along_an_axis_at_a_quantised_mesh() {
                 for sign in [1.0, -1.0] {
                     origin[axis] = centre[axis] - sign * 3.0 * radius;
                     let ray = Ray::new(origin, sign * Vec3::AXES[axis]);
-                    assert!(hit(&scene, ray).is_some(), "a leak at {ray:?}");
+                    let hit = hit(&scene, ray);
+                    let hit = hit.unwrap_or_else(|| panic!("a leak at {ray:?}"));
+                    assert!((32.0..=41.5).contains(&hit.t), "{hit:?}");
                     rays += 1;
                 }
             }
         }
     }
-    assert!(rays > 1_000, "{rays} rays");
+    assert_eq!(rays, 3_942);
 }
 
 /// tinybvh #283: an absolute epsilon on the determinant drops triangles with edges of 2e-4.
+///
+/// Exactly: t = edge, u = v = 1/4 but for the rounding of the edge's fourth, of 2e-18 as of 2.
 #[test]
 fn tinybvh_283_small_triangles() {
     for exponent in -18..=0 {
         let edge = 2.0 * 10f32.powi(exponent);
         let scene = one_triangle([[0.0; 3], [edge, 0.0, 0.0], [0.0, edge, 0.0]]);
         let ray = Ray::new([edge / 4.0, edge / 4.0, edge], [0.0, 0.0, -1.0]);
-        assert_eq!(hit(&scene, ray).expect("a hit").t, edge, "edge {edge}");
+        let hit = hit(&scene, ray).expect("a hit");
+        assert_eq!(hit.t, edge, "edge {edge}");
+        let off = (hit.u - 0.25).abs().max((hit.v - 0.25).abs());
+        assert!(off <= 3e-8, "{hit:?}, edge {edge}");
     }
 }
 
 /// tinybvh #138: fewer than five triangles hang the wide build.
+///
+/// Exactly: each triangle there is at t = 1, u = v = 1/4; where there is none, a miss.
 #[test]
 fn tinybvh_138_few_triangles() {
     for count in 0..12 {
@@ -210,25 +252,37 @@ fn tinybvh_138_few_triangles() {
         );
         for i in 0..12 {
             let ray = Ray::new([2.0 * i as f32 + 0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-            let expected = (i < count).then_some(i);
-            assert_eq!(hit(&scene, ray).map(|hit| hit.primitive), expected);
+            let expected = (i < count).then_some(Hit {
+                t: 1.0,
+                u: 0.25,
+                v: 0.25,
+                primitive: i,
+            });
+            assert_eq!(hit(&scene, ray), expected);
         }
     }
 }
 
 /// parry #444: the picture of a bunny littered with one-pixel holes. A picture of a sphere: each pixel well
 /// within its outline hits, each well outside does not.
+///
+/// Exactly: 8,920 of the 16,384 rays hit, the same as by brute force, at t from 0.9990005 to 0.9999611. Computed t are off by
+/// 1.5e-7.
 #[test]
 fn parry_444_no_holes_in_a_picture() {
     let mesh = shapes::icosphere(4);
     let scene = Variants::new(mesh.positions, mesh.indices);
-    let size = part(128).max(32) as i32;
+    let (size, mut hits) = (part(128).max(32) as i32, 0);
     for y in 0..size {
         for x in 0..size {
             let pixel = |i: i32| (i as f32 + 0.5) / size as f32 * 2.4 - 1.2;
             let target = Vec3::new(pixel(x), pixel(y), 0.0);
             let origin = Vec3::new(0.0, 0.0, 1.0e3);
             let found = scene.agreed(&Ray::new(origin, target - origin)).unwrap();
+            if let Some(hit) = found {
+                hits += 1;
+                assert!((0.999..0.99997).contains(&hit.t), "{hit:?} at {x}, {y}");
+            }
             if target.length() < 0.99 {
                 assert!(found.is_some(), "a hole at {x}, {y}");
             } else if target.length() > 1.01 {
@@ -236,9 +290,14 @@ fn parry_444_no_holes_in_a_picture() {
             }
         }
     }
+    if size == 128 {
+        assert_eq!(hits, 8_920);
+    }
 }
 
 /// nanort #30: a direction component of -5.3e-17 turns a hit into a miss.
+///
+/// Exactly: t = 1 for all but the five rays that start above the very edge and lean out, by however little, which miss.
 #[test]
 fn nanort_30_a_direction_component_next_to_zero() {
     let scene = quad(1.0);
@@ -253,16 +312,16 @@ fn nanort_30_a_direction_component_next_to_zero() {
     ] {
         for x in [-1.0, -0.5, 0.0, 0.5, 1.0] {
             let ray = Ray::new([x, 1.0, 0.25], [tiny, -1.0, tiny]);
-            let inside = hit(&scene, ray);
-            // On the very edge, the side that the component leans to decides.
-            if x.abs() < 1.0 {
-                assert_eq!(inside.expect("a hit").t, 1.0, "{ray:?}");
-            }
+            let leans_out = x.abs() == 1.0 && x * tiny > 0.0;
+            let t = hit(&scene, ray).map(|hit| hit.t);
+            assert_eq!(t, (!leans_out).then_some(1.0), "{ray:?}");
         }
     }
 }
 
 /// bvh #140, #149: an origin in the plane of a box face, with a zero direction component.
+///
+/// Exactly: t = 1 on the lower quad and 5 on the upper one, at their corners, edges and diagonals as inside.
 #[test]
 fn bvh_140_149_origin_in_the_plane_of_a_box_face() {
     // Two separate quads, so that there are boxes of no thickness, and faces in the planes x = 0 and x = 1.
@@ -292,6 +351,8 @@ fn bvh_140_149_origin_in_the_plane_of_a_box_face() {
 }
 
 /// bvh #44: degenerate triangles panic the build. Here they build, and are never hit.
+///
+/// Exactly: a triangle whose corners are on one line has no one point in common with any line, by convention: all miss.
 #[test]
 fn bvh_44_degenerate_triangles() {
     let positions = vec![
@@ -319,6 +380,9 @@ fn bvh_44_degenerate_triangles() {
 }
 
 /// rtbvh #4: axis-aligned quads missed from straight above, not always.
+///
+/// Exactly: all 4,335 rays hit, borders included, at t = 10, or 10 / 7.5 for the longer direction, which is computed as the float
+/// next to it.
 #[test]
 fn rtbvh_4_quads_from_straight_above() {
     for half in [0.5, 1.0, 3.0, 1.0e3, 0.1] {
@@ -329,7 +393,8 @@ fn rtbvh_4_quads_from_straight_above() {
                 let at = |k: i32| half * (k as f32 / steps as f32 * 2.0 - 1.0);
                 for direction in [[0.0, -1.0, 0.0], [-0.0, -1.0, 0.0], [0.0, -7.5, -0.0]] {
                     let ray = Ray::new([at(i), 10.0, at(j)], direction);
-                    assert!(hit(&scene, ray).is_some(), "{ray:?} at ±{half}");
+                    let t = hit(&scene, ray).map(|hit| hit.t);
+                    assert_eq!(t, Some(10.0 / -direction[1]), "{ray:?} at ±{half}");
                 }
             }
         }

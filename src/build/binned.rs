@@ -14,6 +14,7 @@ use super::{
     split::Cut,
     sweep::{self, Leaves},
 };
+use crate::simd::{Backend, Operation, Simd};
 use bytemuck::Zeroable;
 use std::{vec, vec::Vec};
 
@@ -155,6 +156,22 @@ impl<I: Input> Task<'_, I> {
     }
 }
 
+/// Sorts references into those left and right of the cheapest cut, if there is one.
+struct CutInTwo<'a> {
+    refs: &'a mut [Ref],
+    centers: &'a Bounds,
+}
+
+impl Operation for CutInTwo<'_> {
+    type Output = Option<(usize, Bounds, Bounds)>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Self::Output {
+        let cut = Cut::find(self.refs, self.centers)?;
+        Some(cut.partition(self.refs))
+    }
+}
+
 pub(super) fn bounds_of_centers(refs: &[Ref]) -> Bounds {
     refs.iter()
         .fold(Bounds::EMPTY, |centers, r| centers.join_point(r.center2()))
@@ -165,9 +182,9 @@ pub(super) fn bounds_of_centers(refs: &[Ref]) -> Bounds {
 #[inline(never)]
 fn split(refs: &mut [Ref], centers: &Bounds, depth: u32) -> (usize, Bounds, Bounds) {
     if depth < MAX_DEPTH
-        && let Some(cut) = Cut::find(refs, centers)
+        && let Some(cut) = Backend::detect().run(CutInTwo { refs, centers })
     {
-        return cut.partition(refs);
+        return cut;
     }
     // Halves, along the axis on which centers are furthest apart.
     let [x, y, z, _] = (centers.max - centers.min).to_array();

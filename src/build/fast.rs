@@ -142,6 +142,7 @@ impl<L: Copy + Send> Grown<L> {
     }
 
     /// Adds a part that was grown elsewhere.
+    #[cfg(feature = "rayon")]
     fn append(&mut self, part: &Self) {
         let (leaves, nodes) = (self.leaves.len() as u32, self.nodes.len() as u32);
         self.roots

@@ -132,9 +132,7 @@ impl Triangles<'_> {
     fn corners(&self, id: u32) -> [Vec3; 3] {
         self.0.indices()[id as usize].map(|vertex| self.corner(vertex))
     }
-}
 
-impl Triangles<'_> {
     /// The first corner that is not finite.
     #[cold]
     fn non_finite(&self, id: u32) -> Option<BuildError> {

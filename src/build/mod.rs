@@ -10,7 +10,7 @@
 //!
 //! `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
 //!
-//! 1. `morton`: the `refs` along a curve.
+//! 1. `morton`: the primitives along a curve.
 //! 2. `runs`: leaves of what follows each other.
 //! 3. `ploc`: the binary tree over leaves, from the bottom up; then 4 and 6 as above.
 //!

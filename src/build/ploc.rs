@@ -64,6 +64,7 @@ impl Node {
     }
 
     /// The same after so many other leaves and nodes.
+    #[cfg(feature = "rayon")]
     #[inline(always)]
     pub const fn after(&self, leaves: u32, nodes: u32) -> Self {
         match self.is_leaf() {

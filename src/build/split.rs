@@ -58,6 +58,7 @@ impl<const B: usize> Bins<B> {
         counts: [[0; 4]; B],
     };
 
+    #[inline(always)]
     fn fill(&mut self, grid: &Grid, refs: &[Ref]) {
         for r in refs {
             let bounds = r.bounds();
@@ -96,6 +97,7 @@ pub(super) struct Cut {
 
 impl Cut {
     /// The cheapest cut, or `None` if all centers are in one place.
+    #[inline(always)]
     pub fn find(refs: &[Ref], centers: &Bounds) -> Option<Self> {
         // Few references need few bins: there is as much work in a bin as in some references.
         match refs.len() {
@@ -105,6 +107,7 @@ impl Cut {
     }
 
     /// The cheapest of the cuts between `B` bins, a power of two.
+    #[inline(always)]
     fn find_in<const B: usize>(refs: &[Ref], centers: &Bounds) -> Option<Self> {
         let grid = Grid::new(centers, B);
         #[cfg(feature = "rayon")]
@@ -134,6 +137,7 @@ impl Cut {
 
     /// Sorts `refs` into those left and right of the cut: how many are left, and the bounds of either
     /// side's twice-centers.
+    #[inline(always)]
     pub fn partition(&self, refs: &mut [Ref]) -> (usize, Bounds, Bounds) {
         let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
         let (mut start, mut end) = (0, refs.len());
@@ -153,6 +157,7 @@ impl Cut {
 }
 
 impl Grid {
+    #[inline(always)]
     fn cheapest<const B: usize>(&self, bins: &Bins<B>) -> Option<Cut> {
         let join = |all: &mut [Bounds; 3], bin: &[Bounds; 3]| {
             *all = [0, 1, 2].map(|axis| all[axis].join(bin[axis]));

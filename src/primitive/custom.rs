@@ -16,7 +16,7 @@ pub trait Primitives {
     /// What the caller wants to know of a hit beyond `t`: coordinates, a normal, a part's number.
     type Detail: Copy;
 
-    /// The bounds of primitive number `primitive`.
+    /// The bounds of primitive number `primitive`. What has bounds that are empty or not finite is never hit.
     fn aabb(&self, primitive: u32) -> Aabb;
 
     /// The least `t` within the ray's range at which it meets primitive number `primitive`.
@@ -47,6 +47,9 @@ pub(crate) fn intersect<P: Primitives + ?Sized>(
     prepared: &PreparedRay,
 ) -> Option<(f32, P::Detail)> {
     let aabb = primitives.aabb(primitive);
+    if aabb.is_empty() || !aabb.is_finite() {
+        return None;
+    }
     let (lo, hi) = (aabb.min.to_array(), aabb.max.to_array());
     let relative = |bound: [f32; 3]| {
         [0, 1, 2].map(|axis| wide::f32x4::splat(bound[axis] - prepared.ray.origin[axis]))

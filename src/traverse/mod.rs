@@ -1,7 +1,8 @@
 //! Queries, each written once for every node, leaf and backend.
 //!
 //! `single` is the walk of one ray; `wave` interleaves many; a `bundle` goes side by side. `batch` chooses between the
-//! last two. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
+//! last two, by the `classes` of the rays. What a leaf's triangles answer is the same code in all of them, so the answers
+//! are the same bits.
 
 mod batch;
 mod boxes;

@@ -19,7 +19,7 @@ use crate::{
     simd::{Lanes, Simd},
     slab::{NarrowSlabs, PreparedRay, SceneExtent},
 };
-use core::{hint::select_unpredictable, mem::MaybeUninit};
+use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
 
 /// The most runs of 64 rays of a wave.
 pub(super) const GROUPS: usize = 256;
@@ -305,10 +305,10 @@ impl Lane {
 
         // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
         // 32 bits hold.
-        let node = nodes.wrapping_byte_add(self.current.node_offset()) as usize;
-        let leaf = leaves.wrapping_add(self.current.leaf()) as usize;
+        let node = nodes.wrapping_byte_add(self.current.node_offset()).addr();
+        let leaf = leaves.wrapping_add(self.current.leaf()).addr();
         let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
-        token.prefetch((node ^ ((node ^ leaf) & is_leaf)) as *const u8);
+        token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
     }
 
     /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
