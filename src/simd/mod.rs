@@ -10,6 +10,8 @@ mod avx512;
 mod backend;
 mod one;
 mod portable;
+#[cfg(test)]
+mod tests;
 mod vector;
 
 #[cfg(target_arch = "x86_64")]
