@@ -9,7 +9,7 @@ use glam::Vec3;
 use wide_bvh::{
     build::Builder,
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
+    layout::{Bvh, CompactBvh8, Node4, Node8, Storage, TriangleLeaves, WideNode},
     reference,
     simd::Backend,
     traverse::Scratch,
@@ -110,6 +110,9 @@ fn on_all(mut check: impl FnMut(&dyn Batches, &[Ray], &[Option<Hit>])) {
             four.set_backend(backend);
             check(&eight, &rays, &hits);
             check(&four, &rays, &hits);
+            let mut compact: CompactBvh8 = Builder::new().build_compact(&view).unwrap();
+            compact.set_backend(backend);
+            check(&compact.over(&view).unwrap(), &rays, &hits);
         }
     }
 }
@@ -127,7 +130,7 @@ trait Batches {
     fn packet_4(&self, rays: &[Ray; 4], active: u64) -> ([Option<Hit>; 4], [bool; 4]);
 }
 
-impl<N: WideNode> Batches for Bvh<N, TriangleLeaf, Owned> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Batches for Bvh<N, L, S> {
     fn closest(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.closest_hits(rays, hits);
     }
@@ -289,4 +292,21 @@ fn threads_change_nothing() {
             .zip(&hits[0])
             .all(|(&any, hit)| any == hit.is_some())
     );
+}
+
+/// Rays are sorted out by many thousands at a time: more of them, and some.
+#[test]
+fn more_rays_than_are_sorted_at_once() {
+    on_all(|bvh, rays, expected| {
+        let many = |count: usize| (0..count).map(|place| place * 7 % rays.len());
+        let places: Vec<usize> = many(2 * 16384 + 77).collect();
+        let rays: Vec<Ray> = places.iter().map(|&place| rays[place]).collect();
+        let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+        bvh.closest(&rays, &mut hits);
+        bvh.any(&rays, &mut occluded);
+        for ((place, hit), any) in places.into_iter().zip(hits).zip(occluded) {
+            assert_eq!(bits(hit), bits(expected[place]));
+            assert_eq!(any, expected[place].is_some());
+        }
+    });
 }

@@ -108,6 +108,14 @@ impl TriangleLeaf {
 
 impl Triangles for &TriangleLeaf {
     #[inline(always)]
+    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
+    where
+        Self: 'a,
+    {
+        Some(self)
+    }
+
+    #[inline(always)]
     fn first(self) -> usize {
         self.first as usize
     }

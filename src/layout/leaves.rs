@@ -1,6 +1,6 @@
 //! How a hierarchy keeps its leaves, and what the traversal needs of those that hold triangles.
 
-use super::{LayoutError, Leaf, Storage};
+use super::{LayoutError, Leaf, Storage, TriangleLeaf};
 use crate::{
     primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
     simd::{Lanes, Simd},
@@ -101,6 +101,15 @@ pub trait Triangles: Copy {
     fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8>;
     /// The corners of the triangle in a lane, of which there are [`count`](Self::count).
     fn triangle(self, lane: usize) -> [[f32; 3]; 3];
+
+    /// The leaf, if it has vertices that triangles share.
+    #[inline(always)]
+    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
+    where
+        Self: 'a,
+    {
+        None
+    }
 
     /// A bit for each triangle there is.
     #[inline(always)]

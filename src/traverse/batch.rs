@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Storage, TriangleLeaf, WideNode},
+    layout::{Bvh, Storage, TriangleLeaves, WideNode},
     simd::{Operation, Simd},
 };
 use core::{fmt, mem::MaybeUninit};
@@ -49,10 +49,10 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 ///
 /// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
 /// the tree side by side; others are interleaved. Nobody need say which are which.
-impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.backend().run(Batch::<N, S, ClosestHit> {
+        self.backend().run(Batch::<N, L, S, ClosestHit> {
             bvh: self,
             rays,
             answers: hits,
@@ -61,7 +61,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
 
     /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.backend().run(Batch::<N, S, AnyHit> {
+        self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
             rays,
             answers: occluded,
@@ -76,7 +76,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
         rays: &[Ray],
         hits: &mut [Option<Hit>],
     ) {
-        self.backend().run(Wave::<N, S, ClosestHit, LANES> {
+        self.backend().run(Wave::<N, L, S, ClosestHit, LANES> {
             bvh: self,
             rays,
             answers: hits,
@@ -91,7 +91,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
         rays: &[Ray],
         occluded: &mut [bool],
     ) {
-        self.backend().run(Wave::<N, S, AnyHit, LANES> {
+        self.backend().run(Wave::<N, L, S, AnyHit, LANES> {
             bvh: self,
             rays,
             answers: occluded,
@@ -101,7 +101,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
 }
 
 /// Packets: as many rays side by side as an array holds, up to 64; 4 and 8 fill vectors.
-impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// The [closest hit](Self::closest_hit) of each ray that `active` has a bit for, of the first for the lowest; `None` for
     /// the others.
     pub fn closest_hit_packet<const RAYS: usize>(
@@ -109,7 +109,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [Option<Hit>; RAYS] {
-        self.backend().run(Packet::<N, S, ClosestHit, RAYS> {
+        self.backend().run(Packet::<N, L, S, ClosestHit, RAYS> {
             bvh: self,
             rays,
             active,
@@ -123,7 +123,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [bool; RAYS] {
-        self.backend().run(Packet::<N, S, AnyHit, RAYS> {
+        self.backend().run(Packet::<N, L, S, AnyHit, RAYS> {
             bvh: self,
             rays,
             active,
@@ -137,7 +137,7 @@ impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S> {
 const TASK: usize = 4096;
 
 #[cfg(feature = "rayon")]
-impl<N: WideNode, S: Storage> Bvh<N, TriangleLeaf, S>
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S>
 where
     Self: Sync,
 {
@@ -164,13 +164,13 @@ fn paired<'a, A>(rays: &'a [Ray], answers: &'a mut [A]) -> (&'a [Ray], &'a mut [
 }
 
 /// Bundles of the rays that are alike, and waves of what lies between.
-struct Batch<'a, N: WideNode, S: Storage, Q: Query> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
+    bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
 }
 
-impl<N: WideNode, S: Storage, Q: Query> Operation for Batch<'_, N, S, Q> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'_, N, L, S, Q> {
     type Output = ();
 
     #[inline(always)]
@@ -185,22 +185,25 @@ impl<N: WideNode, S: Storage, Q: Query> Operation for Batch<'_, N, S, Q> {
                 .chunks(bundle::RAYS)
                 .zip(answers.chunks_mut(bundle::RAYS));
             for (waiting, (rays, answers)) in waiting.iter_mut().zip(groups) {
-                *waiting = classes::trace::<T, N, S, Q>(token, bvh, rays, answers, &mut patience);
+                *waiting =
+                    classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            wave::trace::<T, N, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
+            wave::trace::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
         }
     }
 }
 
 /// Waves alone.
-struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Wave<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> {
+    bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     scratch: &'a mut Scratch<LANES>,
 }
 
-impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Operation for Wave<'_, N, S, Q, LANES> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> Operation
+    for Wave<'_, N, L, S, Q, LANES>
+{
     type Output = ();
 
     #[inline(always)]
@@ -208,20 +211,22 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Operation for Wave<'
         let (rays, answers) = paired(self.rays, self.answers);
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
             let (all, lanes) = ([u64::MAX; wave::GROUPS], &mut self.scratch.0);
-            wave::trace::<T, N, S, Q, LANES>(token, self.bvh, rays, answers, &all, lanes);
+            wave::trace::<T, N, L, S, Q, LANES>(token, self.bvh, rays, answers, &all, lanes);
         }
     }
 }
 
 /// One bundle, or if the rays are not alike one after the other.
-struct Packet<'a, N: WideNode, S: Storage, Q: Query, const RAYS: usize> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Packet<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> {
+    bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray; RAYS],
     active: u64,
-    one: fn(&Bvh<N, TriangleLeaf, S>, &Ray) -> Q::Answer,
+    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
 }
 
-impl<N: WideNode, S: Storage, Q: Query, const RAYS: usize> Operation for Packet<'_, N, S, Q, RAYS> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Operation
+    for Packet<'_, N, L, S, Q, RAYS>
+{
     type Output = [Q::Answer; RAYS];
 
     #[inline(always)]
@@ -236,7 +241,7 @@ impl<N: WideNode, S: Storage, Q: Query, const RAYS: usize> Operation for Packet<
             }
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
-        let outcome = bundle::trace::<T, N, S, Q>(token, self.bvh, rays, &mut found[..count]);
+        let outcome = bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, &mut found[..count]);
         if outcome == bundle::Outcome::Unlike {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = (self.one)(self.bvh, ray);

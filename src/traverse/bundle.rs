@@ -10,7 +10,7 @@
 use super::{query::Query, triangles::Found};
 use crate::{
     geometry::{Aabb, Ray},
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, Triangles, WideNode},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Along, RayShear, Sheared, bits},
     simd::{Lanes, Simd, Vector, splat3},
     slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocal},
@@ -92,9 +92,9 @@ pub(super) enum Outcome {
 
 /// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike.
 #[inline(always)]
-pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
+pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
     token: T,
-    bvh: &Bvh<N, TriangleLeaf, S>,
+    bvh: &Bvh<N, L, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
 ) -> Outcome {
@@ -104,7 +104,7 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
     let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
         return Outcome::Unlike;
     };
-    bundle.walk::<N, S, Q>(token, bvh);
+    bundle.walk::<N, L, S, Q>(token, bvh);
     let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
     for (index, (rays, answers)) in packets.enumerate() {
         let found = bundle.found >> (LANES * index);
@@ -194,8 +194,12 @@ impl<'a, T: Simd> Bundle<'a, T> {
 
     /// Finds what all rays find.
     #[inline(always)]
-    fn walk<N: WideNode, S: Storage, Q: Query>(&mut self, token: T, bvh: &Bvh<N, TriangleLeaf, S>) {
-        let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves());
+    fn walk<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+        &mut self,
+        token: T,
+        bvh: &Bvh<N, L, S>,
+    ) {
+        let nodes = bvh.nodes().as_ptr();
         let direction = self.rays[0].direction;
         let mut stack = [MaybeUninit::<Entry>::uninit(); STACK];
         let mut len = 0;
@@ -204,7 +208,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
         loop {
             if current.is_leaf() {
                 // SAFETY: the layout's check saw that all leaves led to are there.
-                let leaf = unsafe { leaves.get_unchecked(current.leaf()) };
+                let leaf = unsafe { bvh.leaf(current.leaf()) };
                 self.test_leaf::<Q>(token, leaf, bvh.primitives(), rays);
             } else {
                 // SAFETY: the layout's check saw that all nodes led to are there.
@@ -220,7 +224,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                         (link, *near.as_ref().get_unchecked(lane))
                     };
                     token.prefetch(if link.is_leaf() {
-                        leaves.as_ptr().wrapping_add(link.leaf()).cast()
+                        bvh.leaf_address(link.leaf())
                     } else {
                         nodes.wrapping_byte_add(link.node_offset()).cast()
                     });
@@ -281,7 +285,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     fn test_leaf<Q: Query>(
         &mut self,
         token: T,
-        leaf: &TriangleLeaf,
+        leaf: impl Triangles,
         primitives: &[u32],
         rays: u64,
     ) {
@@ -366,7 +370,7 @@ impl<T: Simd> Packet<T> {
     fn test_leaf<Q: Query>(
         &mut self,
         token: T,
-        leaf: &TriangleLeaf,
+        leaf: impl Triangles,
         primitives: &[u32],
         mut lanes: u32,
         mut found: u32,
@@ -376,20 +380,36 @@ impl<T: Simd> Packet<T> {
         // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
         unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
-        let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
         let nowhere = [V::<T>::splat(token, 0.0); 3];
         let mut vertices = [Sheared::new(nowhere, nowhere, [nowhere[0]; 2]); 8];
-        for vertex in 0..8 {
-            let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
-            vertices[vertex] = Sheared::new(position, origin, self.slope);
+        if let Some(leaf) = leaf.shared() {
+            let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
+            for vertex in 0..8 {
+                let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
+                vertices[vertex] = Sheared::new(position, origin, self.slope);
+            }
         }
         let mut new = 0;
         for triangle in 0..leaf.count() % 16 {
             let place = leaf.first() + triangle;
             let triangle = triangle % 8;
-            let a = vertices[leaf.corners[0][triangle] as usize % 8];
-            let b = vertices[leaf.corners[1][triangle] as usize % 8];
-            let c = vertices[leaf.corners[2][triangle] as usize % 8];
+            let [a, b, c] = if let Some(leaf) = leaf.shared() {
+                let [a, b, c] = &leaf.corners;
+                [
+                    vertices[a[triangle] as usize % 8],
+                    vertices[b[triangle] as usize % 8],
+                    vertices[c[triangle] as usize % 8],
+                ]
+            } else {
+                let mut corners = [vertices[0]; 3];
+                let own = leaf.triangle(triangle);
+                for corner in 0..3 {
+                    let position = [own[corner][kx], own[corner][ky], own[corner][kz]];
+                    let position = splat3(token, position);
+                    corners[corner] = Sheared::new(position, origin, self.slope);
+                }
+                corners
+            };
             let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
             let edges = self.along.edges(token, corners, lanes);
             if edges.candidates == 0 {
@@ -429,7 +449,7 @@ impl<T: Simd> Packet<T> {
     fn test_by_ray<Q: Query>(
         &mut self,
         token: T,
-        leaf: &TriangleLeaf,
+        leaf: impl Triangles,
         primitives: &[u32],
         lanes: u32,
         found: u32,

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Storage, TriangleLeaf, WideNode},
+    layout::{Bvh, Storage, TriangleLeaves, WideNode},
     simd::{Lanes, Simd, Vector},
     slab::PreparedRay,
 };
@@ -61,9 +61,9 @@ impl Pause {
 /// Traces rays, no more than [`bundle::RAYS`], of which there are as many as answers, in bundles where they are alike.
 /// A bit for each ray that is left.
 #[inline(always)]
-pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
+pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
     token: T,
-    bvh: &Bvh<N, TriangleLeaf, S>,
+    bvh: &Bvh<N, L, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
     patience: &mut Patience,
@@ -91,7 +91,7 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query>(
             }
             (&gathered[..count], &mut found[..count])
         };
-        let outcome = bundle::trace::<T, N, S, Q>(token, bvh, part, out);
+        let outcome = bundle::trace::<T, N, L, S, Q>(token, bvh, part, out);
         let alike = outcome != Outcome::Unlike;
         if whole {
             if alike {

@@ -14,7 +14,7 @@
 use super::{query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaf, Triangles, WideNode},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Corners, Edges, RayShear},
     simd::{Lanes, Simd},
     slab::{NarrowSlabs, PreparedRay, SceneExtent},
@@ -57,8 +57,8 @@ pub(super) struct Lane {
 }
 
 /// Rays to be traced, and those that are.
-struct Wave<'a, N: WideNode, S: Storage, Q: Query, const LANES: usize> {
-    bvh: &'a Bvh<N, TriangleLeaf, S>,
+struct Wave<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> {
+    bvh: &'a Bvh<N, L, S>,
     scene: SceneExtent,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
@@ -76,9 +76,16 @@ type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
 /// Traces those `rays` that `waiting` has a bit for, the first 64 in its first number and so on. There are as many as
 /// `answers`. Bits past the last ray are passed over.
 #[inline(always)]
-pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usize>(
+pub(super) fn trace<
+    T: Simd,
+    N: WideNode,
+    L: TriangleLeaves,
+    S: Storage,
+    Q: Query,
+    const LANES: usize,
+>(
     token: T,
-    bvh: &Bvh<N, TriangleLeaf, S>,
+    bvh: &Bvh<N, L, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
     waiting: &[u64; GROUPS],
@@ -89,7 +96,7 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usi
         answers.fill(Q::MISS);
         return;
     }
-    let mut wave = Wave::<N, S, Q, LANES> {
+    let mut wave = Wave::<N, L, S, Q, LANES> {
         bvh,
         scene: SceneExtent::new(bvh.bounds()),
         rays,
@@ -102,7 +109,9 @@ pub(super) fn trace<T: Simd, N: WideNode, S: Storage, Q: Query, const LANES: usi
     wave.run(token);
 }
 
-impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LANES> {
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize>
+    Wave<'_, N, L, S, Q, LANES>
+{
     #[inline(always)]
     fn run<T: Simd>(&mut self, token: T) {
         // Lengths apart from what they are of, and both from all else, so that they stay in registers.
@@ -127,7 +136,7 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
                 for place in 0..take(&mut nodes) {
                     let (lane, bvh) = (at_node.get(place), self.bvh);
                     let state = self.lane(lane);
-                    state.test_node::<T, N, S, Q>(token, bvh);
+                    state.test_node::<T, N, L, S, Q>(token, bvh);
                     let leaf = state.current.is_leaf();
                     at_node.push_if(&mut nodes, lane, !leaf);
                     at_rest.push_if(&mut rest, lane, leaf);
@@ -157,7 +166,7 @@ impl<N: WideNode, S: Storage, Q: Query, const LANES: usize> Wave<'_, N, S, Q, LA
                 // SAFETY: written when the lane came to this place of the list.
                 let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
                 let state = self.lane(lane);
-                state.test_triangles::<T, N, S, Q>(token, bvh, look);
+                state.test_triangles::<T, N, L, S, Q>(token, bvh, look);
                 let leaf = state.current.is_leaf();
                 at_node.push_if(&mut nodes, lane, !leaf);
                 at_rest.push_if(&mut rest, lane, leaf);
@@ -266,12 +275,12 @@ impl Lane {
 
     /// Tests the node's boxes, and goes on to the nearest child or else to the stack's last entry.
     #[inline(always)]
-    fn test_node<T: Simd, N: WideNode, S: Storage, Q: Query>(
+    fn test_node<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
         token: T,
-        bvh: &Bvh<N, TriangleLeaf, S>,
+        bvh: &Bvh<N, L, S>,
     ) {
-        let (nodes, leaves) = (bvh.nodes().as_ptr(), bvh.leaves().as_ptr());
+        let nodes = bvh.nodes().as_ptr();
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { &*nodes.byte_add(self.current.node_offset()) };
         let slabs = N::widen(token, &self.slabs);
@@ -306,17 +315,17 @@ impl Lane {
         // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
         // 32 bits hold.
         let node = nodes.wrapping_byte_add(self.current.node_offset()).addr();
-        let leaf = leaves.wrapping_add(self.current.leaf()).addr();
+        let leaf = bvh.leaf_address(self.current.leaf()).addr();
         let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
         token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
     }
 
     /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
     #[inline(always)]
-    fn look_at_leaf<T: Simd, N: WideNode, S: Storage>(
+    fn look_at_leaf<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
         &mut self,
         token: T,
-        bvh: &Bvh<N, TriangleLeaf, S>,
+        bvh: &Bvh<N, L, S>,
         look: &mut MaybeUninit<Look<T>>,
     ) -> bool {
         let (_, edges) = look.write(self.leaf(bvh).edges(token, &self.shear(token)));
@@ -330,10 +339,10 @@ impl Lane {
 
     /// Tests the leaf's triangles, and goes on to the stack's last entry, or the end if enough is known.
     #[inline(always)]
-    fn test_triangles<T: Simd, N: WideNode, S: Storage, Q: Query>(
+    fn test_triangles<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
         token: T,
-        bvh: &Bvh<N, TriangleLeaf, S>,
+        bvh: &Bvh<N, L, S>,
         &(corners, edges): &Look<T>,
     ) {
         let t_max = T::F32x8::splat(token, self.t_max);
@@ -378,12 +387,12 @@ impl Lane {
     }
 
     #[inline(always)]
-    fn leaf<'a, N: WideNode, S: Storage>(
+    fn leaf<'a, N: WideNode, L: TriangleLeaves, S: Storage>(
         &self,
-        bvh: &'a Bvh<N, TriangleLeaf, S>,
-    ) -> &'a TriangleLeaf {
+        bvh: &'a Bvh<N, L, S>,
+    ) -> L::Ref<'a> {
         // SAFETY: the layout's check saw that all leaves led to are there.
-        unsafe { bvh.leaves().get_unchecked(self.current.leaf()) }
+        unsafe { bvh.leaf(self.current.leaf()) }
     }
 
     #[inline(always)]
