@@ -84,8 +84,14 @@ fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
             assert!((588.9..611.2).contains(&hit.t), "{hit:?} on {corners:?}");
         }
     }
-    // Sines are rounded otherwise elsewhere.
-    assert!((part(18_950)..part(19_070)).contains(&hits), "{hits} hits");
+    // Sines are rounded otherwise elsewhere; and of a part there may be some more or fewer.
+    let slack = if part(20_000) < 20_000 {
+        part(1_000)
+    } else {
+        0
+    };
+    let range = part(18_950) - slack..part(19_070) + slack;
+    assert!(range.contains(&hits), "{hits} hits");
 }
 
 /// Embree #423: SSE2, SSE4.2 and AVX report a hit that AVX2 does not. Rays that graze edges, on every
