@@ -2,7 +2,7 @@
 
 use super::{
     Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, MeshLeaf, Node4, Node8,
-    PrimitiveLeaf, RunLeaf, Runs, Storage, TriangleLeaf, WideNode, check,
+    PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, check,
 };
 use crate::{geometry::Aabb, simd::Backend};
 use core::fmt;
@@ -185,6 +185,17 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
             dropped: self.dropped,
         }
     }
+
+    /// The same hierarchy, borrowed.
+    pub fn as_borrowed(&self) -> Bvh<N, L, Borrowed<'_>> {
+        self.with_leaves(L::borrowed::<S>(&self.leaves))
+    }
+
+    /// How many bytes nodes, leaves and primitive numbers take: what there is beside the primitives, or the mesh, of a
+    /// caller.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes()) + L::bytes::<S>(&self.leaves) + size_of_val(self.primitives())
+    }
 }
 
 impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
@@ -192,28 +203,6 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
     #[inline(always)]
     pub fn leaves(&self) -> &[L] {
         &self.leaves
-    }
-
-    /// The same hierarchy, borrowed.
-    pub fn as_borrowed(&self) -> Bvh<N, L, Borrowed<'_>> {
-        self.with_leaves(&*self.leaves)
-    }
-
-    /// How many bytes nodes, leaves and primitive numbers take.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.nodes()) + size_of_val(self.leaves()) + size_of_val(self.primitives())
-    }
-}
-
-impl<N: WideNode, M: Copy, S: Storage> Bvh<N, Runs<M>, S> {
-    /// The same hierarchy, borrowed.
-    pub fn as_borrowed(&self) -> Bvh<N, Runs<M>, Borrowed<'_>> {
-        self.with_leaves(self.leaves)
-    }
-
-    /// How many bytes nodes and primitive numbers take: what there is beside the primitives themselves.
-    pub fn bytes(&self) -> usize {
-        size_of_val(self.nodes()) + size_of_val(self.primitives())
     }
 }
 

@@ -124,10 +124,21 @@ pub trait Head: Pod + Debug {
     /// Where a child is. `N` are the nodes.
     #[doc(hidden)]
     fn link<N>(&self, more: u8, lane: usize) -> Link;
+    /// Where all are.
+    #[doc(hidden)]
+    fn places(&self, more: u8) -> Places;
 }
 
 /// The place of the first child that is a node; the first primitive of those that are leaves; for each child how many
-/// primitives there are up to its end, 0 for nodes. The frame's byte is the number of children.
+/// primitives there are up to its end, 0 for nodes.
+#[doc(hidden)]
+pub struct Places {
+    nodes: u32,
+    units: u32,
+    ends: [u8; 8],
+}
+
+/// As [`Places`]. The frame's byte is the number of children.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Head8 {
@@ -162,6 +173,12 @@ impl Head for Head8 {
             return Link::node::<N>(self.nodes.wrapping_add(lane));
         }
         leaf(self.units, start as u32, end as u32)
+    }
+
+    #[inline(always)]
+    fn places(&self, _: u8) -> Places {
+        let Self { nodes, units, ends } = *self;
+        Places { nodes, units, ends }
     }
 }
 
@@ -216,6 +233,20 @@ impl Head for Head4 {
         let pairs = (before & 0x0f0f) + (before >> 4 & 0x0f0f);
         let start = (pairs + (pairs >> 8)) & 0xff;
         leaf(self.units & Self::PLACE, start, start + count)
+    }
+
+    #[inline(always)]
+    fn places(&self, more: u8) -> Places {
+        let counts = self.counts(more);
+        // A byte a child, then the sum of those up to it: 15, no child, comes after all.
+        let pairs = counts & 0xff | (counts & 0xff00) << 8;
+        let bytes = pairs & 0x000f_000f | (pairs & 0x00f0_00f0) << 4;
+        let [a, b, c, d] = bytes.wrapping_mul(0x0101_0101).to_le_bytes();
+        Places {
+            nodes: self.nodes & Self::PLACE,
+            units: self.units & Self::PLACE,
+            ends: [a, b, c, d, 0, 0, 0, 0],
+        }
     }
 }
 
@@ -323,10 +354,10 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
 
     #[inline(always)]
     fn link_lanes<V: Vector<W>>(&self, token: V::Token) -> V {
-        let mut links = [0.0; W];
-        for (lane, link) in links.iter_mut().enumerate() {
-            *link = f32::from_bits(self.head.link::<Self>(self.frame.more, lane).to_bits());
-        }
-        V::load(token, &links)
+        let places = self.head.places(self.frame.more);
+        let ends = places.ends.first_chunk().unwrap_or(&[0; W]);
+        let stride = Link::node::<Self>(1).to_bits();
+        let base = Link::node::<Self>(places.nodes).to_bits();
+        V::links(token, ends, base, stride, places.units)
     }
 }

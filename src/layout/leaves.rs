@@ -1,6 +1,6 @@
 //! How a hierarchy keeps its leaves, and what the traversal needs of those that hold triangles.
 
-use super::{LayoutError, Leaf, Storage, TriangleLeaf};
+use super::{Borrowed, LayoutError, Leaf, Storage, TriangleLeaf};
 use crate::{
     primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
     simd::{Lanes, Simd},
@@ -33,6 +33,12 @@ pub trait Leaves: Sized {
     fn numbers(_primitives: &[u32]) -> u64 {
         0
     }
+    /// The same, borrowed.
+    #[doc(hidden)]
+    fn borrowed<S: Storage>(store: &Self::Store<S>) -> Self::Store<Borrowed<'_>>;
+    /// How many bytes they take.
+    #[doc(hidden)]
+    fn bytes<S: Storage>(store: &Self::Store<S>) -> usize;
     /// The leaf at a place.
     ///
     /// # Safety
@@ -71,6 +77,14 @@ impl<L: Leaf> Leaves for L {
             }
         }
         Ok(store.len())
+    }
+
+    fn borrowed<S: Storage>(store: &S::Slice<L>) -> &[L] {
+        store
+    }
+
+    fn bytes<S: Storage>(store: &S::Slice<L>) -> usize {
+        size_of_val(&**store)
     }
 
     #[inline(always)]

@@ -73,6 +73,14 @@ impl<M: Copy> Leaves for Runs<M> {
         greatest.map_or(0, |&number| u64::from(number) + 1)
     }
 
+    fn borrowed<S: Storage>(of: &M) -> M {
+        *of
+    }
+
+    fn bytes<S: Storage>(_: &M) -> usize {
+        0
+    }
+
     #[inline(always)]
     unsafe fn at<'a, S: Storage>(of: &'a M, primitives: &'a [u32], place: usize) -> Run<'a, M> {
         Run {

@@ -73,7 +73,7 @@ macro_rules! impl_vector {
     (
         $vector:ident, $n:literal, $splat:ident, $load:ident, $store:ident,
         $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident, $or:ident, $andnot:ident,
-        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident
+        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident, $links:ident
     ) => {
         impl_operator!($vector, Add, add, $add);
         impl_operator!($vector, Sub, sub, $sub);
@@ -161,6 +161,10 @@ macro_rules! impl_vector {
                 Self(unsafe { $of_bits(bits) })
             }
             #[inline(always)]
+            fn links(_: Avx2, ends: &[u8; $n], base: u32, stride: u32, first: u32) -> Self {
+                Self(unsafe { $links(ends, base, stride, first) })
+            }
+            #[inline(always)]
             fn permute(self, lanes: &[u8; $n]) -> Self {
                 Self(unsafe { $permute(self.0, lanes) })
             }
@@ -190,7 +194,8 @@ impl_vector!(
     permute4,
     least4,
     of_bits4,
-    of_bytes4
+    of_bytes4,
+    links4
 );
 
 impl_vector!(
@@ -215,7 +220,8 @@ impl_vector!(
     permute8,
     least8,
     of_bits8,
-    of_bytes8
+    of_bytes8,
+    links8
 );
 
 /// For a mask of lanes, their numbers in order.
@@ -264,6 +270,42 @@ fn of_bytes4(bytes: &[u8; 4]) -> __m128 {
 fn of_bytes8(bytes: &[u8; 8]) -> __m256 {
     let bytes = _mm_cvtsi64_si128(i64::from_le_bytes(*bytes));
     _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(bytes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn links4(ends: &[u8; 4], base: u32, stride: u32, first: u32) -> __m128 {
+    let ends = u32::from_le_bytes(*ends);
+    let starts = _mm_cvtepu8_epi32(_mm_cvtsi32_si128((ends << 8) as i32));
+    let ends = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(ends as i32));
+    let lanes = _mm_setr_epi32(0, 1, 2, 3);
+    let strides = _mm_mullo_epi32(lanes, _mm_set1_epi32(stride as i32));
+    let nodes = _mm_add_epi32(_mm_set1_epi32(base as i32), strides);
+    let first = _mm_add_epi32(_mm_set1_epi32(first as i32), starts);
+    let first = _mm_and_si128(first, _mm_set1_epi32((1 << 28) - 1));
+    let counts = _mm_sub_epi32(_mm_sub_epi32(ends, starts), _mm_set1_epi32(1));
+    let counts = _mm_slli_epi32::<28>(_mm_and_si128(counts, _mm_set1_epi32(7)));
+    let leaves = _mm_or_si128(_mm_or_si128(first, counts), _mm_set1_epi32(i32::MIN));
+    let is_node = _mm_cmpeq_epi32(ends, _mm_setzero_si128());
+    _mm_castsi128_ps(_mm_blendv_epi8(leaves, nodes, is_node))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn links8(ends: &[u8; 8], base: u32, stride: u32, first: u32) -> __m256 {
+    let ends = u64::from_le_bytes(*ends);
+    let starts = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((ends << 8) as i64));
+    let ends = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(ends as i64));
+    let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    let strides = _mm256_mullo_epi32(lanes, _mm256_set1_epi32(stride as i32));
+    let nodes = _mm256_add_epi32(_mm256_set1_epi32(base as i32), strides);
+    let first = _mm256_add_epi32(_mm256_set1_epi32(first as i32), starts);
+    let first = _mm256_and_si256(first, _mm256_set1_epi32((1 << 28) - 1));
+    let counts = _mm256_sub_epi32(_mm256_sub_epi32(ends, starts), _mm256_set1_epi32(1));
+    let counts = _mm256_slli_epi32::<28>(_mm256_and_si256(counts, _mm256_set1_epi32(7)));
+    let leaves = _mm256_or_si256(_mm256_or_si256(first, counts), _mm256_set1_epi32(i32::MIN));
+    let is_node = _mm256_cmpeq_epi32(ends, _mm256_setzero_si256());
+    _mm256_castsi256_ps(_mm256_blendv_epi8(leaves, nodes, is_node))
 }
 
 #[inline]

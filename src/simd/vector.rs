@@ -5,6 +5,7 @@
 //! `permute`, `replace`) give the same bits on every backend. `mul_add`, `min` and `max` may differ in rounding,
 //! NaN and the sign of zero; the box test uses them, and is conservative.
 
+use crate::layout::run_place;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 /// A proof that the processor has a backend's instructions.
@@ -145,6 +146,25 @@ pub trait Vector<const N: usize>:
 
     /// A comparison's outcome that is set in the lanes that `bits` has a bit for.
     fn of_bits(token: Self::Token, bits: u32) -> Self;
+
+    /// Bits, lane by lane: of lane `i` with `ends[i]` 0, `base + i · stride`; of others, `first` plus the end before, with a
+    /// number of three bits from bit 28 on, how far this end is from that one, less 1, and bit 31 set. It is how compact
+    /// nodes say where their children are: see [`layout`](crate::layout).
+    #[inline(always)]
+    fn links(token: Self::Token, ends: &[u8; N], base: u32, stride: u32, first: u32) -> Self {
+        let mut links = [0.0; N];
+        let mut start = 0;
+        for (lane, &end) in (0..).zip(ends) {
+            let end = u32::from(end);
+            let link = match end {
+                0 => base.wrapping_add(lane * stride),
+                _ => 1 << 31 | run_place(first.wrapping_add(start), end.wrapping_sub(start)),
+            };
+            links[lane as usize] = f32::from_bits(link);
+            start = end;
+        }
+        Self::load(token, &links)
+    }
 
     /// Lane `i` becomes lane `lanes[i]` modulo `N`.
     fn permute(self, lanes: &[u8; N]) -> Self;
