@@ -4,6 +4,7 @@ use crate::{
     geometry::Aabb,
     layout::{
         Bvh, Child, ChildKind, LayoutError, Owned, PrimitiveLeaf, RunLeaf, WideNode, run_place,
+        tested_bounds,
     },
 };
 use std::vec::Vec;
@@ -35,10 +36,7 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
         )
     };
     let nodes: Vec<C> = full.nodes().iter().map(node).collect();
-    let boxes = nodes
-        .iter()
-        .flat_map(|node| (0..C::WIDTH).map(|lane| node.child_aabb(lane)));
-    let bounds = boxes.fold(*full.bounds(), Aabb::join);
+    let bounds = tested_bounds(&nodes, *full.bounds());
     let compact = Bvh::from_parts(nodes, (), full.primitives().to_vec(), bounds)?;
     Ok(compact.with_dropped(full.dropped() as u32))
 }
