@@ -4,7 +4,7 @@ mod common;
 
 use common::{SEED, bits};
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, Preset},
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{
         Aligned, Borrowed, Bvh, Bvh4, Bvh8, BytesError, CompactBvh4, CompactBvh8, CompactNode4,
@@ -114,6 +114,45 @@ fn compact_ones_there_and_back() {
             assert_eq!(bits(opened.closest_hit(ray)), bits(full.closest_hit(ray)));
         }
     });
+}
+
+/// Compact nodes take their children in one order only, nodes before leaves. The builder has to give them that order, and
+/// bounds that hold their larger boxes, with leaves of whatever kind; moved, too.
+#[test]
+fn compact_nodes_over_leaves_of_their_own() {
+    let scene = Scene::new(500);
+    let mesh = scene.mesh();
+    let full: Bvh8 = Builder::new().build(&mesh).unwrap();
+    let moved: Vec<[f32; 3]> = scene.positions.iter().map(|p| p.map(|x| 3.0 * x)).collect();
+    let moved = TriangleMesh::new(&moved, &scene.indices).unwrap();
+    let full_moved: Bvh8 = Builder::new().build(&moved).unwrap();
+    for preset in [Preset::Best, Preset::Balanced, Preset::Fast] {
+        let builder = Builder::preset(preset);
+        over_own_leaves::<CompactNode8>(&builder, &mesh, &scene.rays, &full);
+        over_own_leaves::<CompactNode4>(&builder, &mesh, &scene.rays, &full);
+    }
+    let mut bvh = Builder::new().build_as::<CompactNode8>(&mesh).unwrap();
+    bvh.refit(&moved).unwrap();
+    same_hits(&bvh, &scene.rays, &full_moved);
+}
+
+fn over_own_leaves<N: WideNode>(builder: &Builder, mesh: &TriangleMesh, rays: &[Ray], full: &Bvh8) {
+    let bvh = builder.build_as::<N>(mesh).unwrap();
+    same_hits(&bvh, rays, full);
+    there_and_back(&bvh, |bytes| {
+        let opened = Bvh::<N, TriangleLeaf, Borrowed>::from_bytes(bytes).unwrap();
+        same_hits(&opened, rays, full);
+    });
+}
+
+fn same_hits<N: WideNode, S: Storage>(bvh: &Bvh<N, TriangleLeaf, S>, rays: &[Ray], full: &Bvh8) {
+    let mut hits = vec![None; rays.len()];
+    bvh.closest_hits(rays, &mut hits);
+    for (ray, hit) in rays.iter().zip(hits) {
+        assert_eq!(bits(bvh.closest_hit(ray)), bits(full.closest_hit(ray)));
+        assert_eq!(bits(hit), bits(full.closest_hit(ray)));
+        assert_eq!(bvh.any_hit(ray), full.any_hit(ray));
+    }
 }
 
 #[test]

@@ -9,7 +9,9 @@ Renders a mesh to a PNG.
 
 Usage: render [MESH] [OPTIONS]
 
-  MESH                 a PLY, OBJ or glTF file; without it, a scene made by code
+  MESH                 a PLY, OBJ or glTF file, or one that `bake` has written, which is traced where it is;
+                       without it, a scene made by code
+      --over MESH      the mesh of a baked file that has none in it
   -o, --out FILE       the picture [render.png]
   -s, --size WxH       its size in pixels [1280x720]
   -m, --mode MODE      shaded: sun, shadows and sky [the default]
@@ -31,6 +33,8 @@ pub enum Request {
 pub struct Args {
     /// The mesh's file, or none for the scene made by code.
     pub mesh: Option<PathBuf>,
+    /// The file of the mesh that a baked file is over.
+    pub over: Option<PathBuf>,
     /// Where the picture goes.
     pub out: PathBuf,
     /// Pixels across.
@@ -67,6 +71,7 @@ const MAX_SAMPLES: u32 = 1024;
 pub fn parse() -> Result<Request, lexopt::Error> {
     let mut args = Args {
         mesh: None,
+        over: None,
         out: "render.png".into(),
         width: 1280,
         height: 720,
@@ -78,6 +83,7 @@ pub fn parse() -> Result<Request, lexopt::Error> {
     while let Some(argument) = parser.next()? {
         match argument {
             Arg::Short('h') | Arg::Long("help") => return Ok(Request::Help),
+            Arg::Long("over") => args.over = Some(mesh(parser.value()?)?),
             Arg::Short('o') | Arg::Long("out") => args.out = parser.value()?.into(),
             Arg::Short('s') | Arg::Long("size") => {
                 (args.width, args.height) = parser.value()?.parse_with(size)?;

@@ -2,16 +2,43 @@
 
 use glam::Vec3;
 use wide_bvh::{
-    geometry::{Hit, Ray},
-    layout::Bvh8,
+    geometry::{Hit, Ray, TriangleMesh},
+    layout::{Bvh, Storage, TriangleLeaves, WideNode},
     traverse::Counts,
 };
-use wide_bvh_scenes::Mesh;
+use wide_bvh_scenes::bounds;
+
+/// A hierarchy over triangles, of whatever nodes and leaves.
+pub trait Hierarchy: Sync {
+    /// The nearest triangle.
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit>;
+    /// Whether there is one.
+    fn any_hit(&self, ray: &Ray) -> bool;
+    /// What it takes to find the nearest.
+    fn cost(&self, ray: &Ray) -> Counts;
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Hierarchy for Bvh<N, L, S>
+where
+    Self: Sync,
+{
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_hit(ray)
+    }
+
+    fn any_hit(&self, ray: &Ray) -> bool {
+        self.any_hit(ray)
+    }
+
+    fn cost(&self, ray: &Ray) -> Counts {
+        self.closest_hit_counted(ray).1
+    }
+}
 
 /// All there is to trace.
 pub struct World<'m> {
-    mesh: &'m Mesh,
-    bvh: Bvh8,
+    mesh: TriangleMesh<'m>,
+    bvh: Box<dyn Hierarchy + 'm>,
     bounds: [Vec3; 2],
     /// The diagonal of the bounds: what "near" and "far" are measured by.
     pub size: f32,
@@ -31,8 +58,8 @@ pub struct Surface {
 
 impl<'m> World<'m> {
     /// Joins a mesh and the hierarchy over its triangles.
-    pub fn new(mesh: &'m Mesh, bvh: Bvh8) -> Self {
-        let (min, max) = mesh.bounds();
+    pub fn new(mesh: TriangleMesh<'m>, bvh: Box<dyn Hierarchy + 'm>) -> Self {
+        let (min, max) = bounds(mesh.positions(), mesh.indices());
         let (min, max) = (Vec3::from(min), Vec3::from(max));
         // Interpolated points are off by some 2^-23 of the largest coordinate; this is 80 times that.
         let largest = min.abs().max(max.abs()).max_element();
@@ -53,8 +80,8 @@ impl<'m> World<'m> {
     }
 
     fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let corners = self.mesh.indices[hit.primitive as usize];
-        let [a, b, c] = corners.map(|index| Vec3::from(self.mesh.positions[index as usize]));
+        let corners = self.mesh.indices()[hit.primitive as usize];
+        let [a, b, c] = corners.map(|index| Vec3::from(self.mesh.positions()[index as usize]));
         let across = (b - a).cross(c - a).normalize_or(-ray.direction);
         let normal = across * -across.dot(ray.direction).signum();
         // Exact to the rounding of the corners, where origin + t * direction loses more with distance.
@@ -92,6 +119,6 @@ impl Tracer<'_> {
     /// The work that it takes to find the nearest surface.
     pub fn cost(&mut self, ray: &Ray) -> Counts {
         self.rays += 1;
-        self.world.bvh.closest_hit_counted(ray).1
+        self.world.bvh.cost(ray)
     }
 }

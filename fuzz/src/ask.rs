@@ -2,7 +2,7 @@
 
 use wide_bvh::{
     geometry::{Hit, Ray},
-    layout::{Borrowed, Bvh, PrimitiveLeaf, TriangleLeaf, WideNode},
+    layout::{Borrowed, Bvh, MeshLeaf, PrimitiveLeaf, TriangleLeaf, TriangleLeaves, WideNode},
     primitive::{PrimitiveHit, Primitives},
     simd::Backend,
     traverse::Scratch,
@@ -64,16 +64,16 @@ pub(crate) fn ask<N: WideNode>(
     answers
 }
 
-fn singles<N: WideNode>(
-    bvh: &Bvh<N, TriangleLeaf, Borrowed>,
+fn singles<N: WideNode, L: TriangleLeaves>(
+    bvh: &Bvh<N, L, Borrowed>,
     rays: &[Ray],
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
     let answer = |ray| (bvh.closest_hit(ray), bvh.any_hit(ray));
     rays.iter().map(answer).unzip()
 }
 
-fn counted<N: WideNode>(
-    bvh: &Bvh<N, TriangleLeaf, Borrowed>,
+fn counted<N: WideNode, L: TriangleLeaves>(
+    bvh: &Bvh<N, L, Borrowed>,
     rays: &[Ray],
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
     let answer = |ray| (bvh.closest_hit_counted(ray).0, bvh.any_hit_counted(ray).0);
@@ -138,6 +138,27 @@ fn packets<N: WideNode, const RAYS: usize>(
         }
     }
     (hits, occluded)
+}
+
+/// As [`ask`], of leaves that read a mesh, one by one.
+pub(crate) fn ask_mesh<'a, N: WideNode>(
+    mut bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
+    rays: &[Ray],
+) -> Vec<Answers> {
+    let mut answers = Vec::new();
+    for backend in Backend::available() {
+        bvh.set_backend(backend);
+        let asked = [
+            ("one by one", singles(&bvh, rays)),
+            ("counted", counted(&bvh, rays)),
+        ];
+        answers.extend(asked.map(|(how, (closest, any))| Answers {
+            how: format!("{how}, of a mesh, {} wide, {}", N::WIDTH, backend.name()),
+            closest: closest.into_iter().map(found).collect(),
+            any,
+        }));
+    }
+    answers
 }
 
 /// As [`ask`], over a caller's primitives.

@@ -4,6 +4,7 @@ use crate::{
     geometry::Aabb,
     layout::{
         Bvh, Child, ChildKind, LayoutError, Owned, PrimitiveLeaf, RunLeaf, WideNode, run_place,
+        tested_bounds,
     },
 };
 use std::vec::Vec;
@@ -15,11 +16,16 @@ use std::vec::Vec;
 pub(super) fn compact<N: WideNode, C: WideNode>(
     full: &Bvh<N, PrimitiveLeaf, Owned>,
 ) -> Result<Bvh<C, RunLeaf, Owned>, LayoutError> {
+    // Leaves' primitives in the order of leaves, which a builder along a curve has not.
+    let mut primitives = Vec::with_capacity(full.primitives().len());
+    let run = |leaf: &PrimitiveLeaf| {
+        let first = primitives.len() as u32;
+        primitives.extend_from_slice(&full.primitives()[leaf.range()]);
+        Child::leaf(run_place(first, leaf.range().len() as u32))
+    };
+    let runs: Vec<Child> = full.leaves().iter().map(run).collect();
     let place = |child: Child| match child.kind() {
-        ChildKind::Leaf(leaf) => {
-            let range = full.leaves()[leaf].range();
-            Child::leaf(run_place(range.start as u32, range.len() as u32))
-        }
+        ChildKind::Leaf(leaf) => runs[leaf],
         _ => child,
     };
     let node = |node: &N| {
@@ -35,10 +41,7 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
         )
     };
     let nodes: Vec<C> = full.nodes().iter().map(node).collect();
-    let boxes = nodes
-        .iter()
-        .flat_map(|node| (0..C::WIDTH).map(|lane| node.child_aabb(lane)));
-    let bounds = boxes.fold(*full.bounds(), Aabb::join);
-    let compact = Bvh::from_parts(nodes, (), full.primitives().to_vec(), bounds)?;
+    let bounds = tested_bounds(&nodes, *full.bounds());
+    let compact = Bvh::from_parts(nodes, (), primitives, bounds)?;
     Ok(compact.with_dropped(full.dropped() as u32))
 }

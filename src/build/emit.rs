@@ -106,6 +106,9 @@ pub(super) fn walk<N: WideNode, const W: usize>(
             }
             lanes[place] = (area, child);
         }
+        if N::NODES_FIRST {
+            lanes[..count].sort_by_key(|&(_, child)| shape.is_leaf(child));
+        }
         let (known, first) = (todo.len(), nodes.len());
         let lanes = lanes[..count].iter().map(|&(_, child)| {
             let link = if shape.is_leaf(child) {

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
-    layout::{Bvh, ChildKind, Leaf, Owned, PrimitiveLeaf, TriangleLeaf, WideNode},
+    layout::{Bvh, ChildKind, Leaf, Owned, PrimitiveLeaf, TriangleLeaf, WideNode, tested_bounds},
     simd::{Backend, Operation, Simd},
 };
 use bytemuck::Zeroable;
@@ -114,7 +114,10 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, Owned> {
             *node = N::from_children(lanes);
             node_boxes[index] = all;
         }
-        *bounds = of(root, &node_boxes);
+        *bounds = match N::NODES_FIRST {
+            true => tested_bounds(nodes, of(root, &node_boxes)),
+            false => of(root, &node_boxes),
+        };
     }
 }
 

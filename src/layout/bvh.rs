@@ -109,7 +109,6 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     }
 
     /// How the leaves are kept.
-    #[cfg(feature = "alloc")]
     pub(super) fn leaf_store(&self) -> &L::Store<S> {
         &self.leaves
     }
@@ -209,7 +208,8 @@ impl<N: WideNode, L: Leaf, S: Storage> Bvh<N, L, S> {
 #[cfg(feature = "std")]
 impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
     /// Puts together what the builder has emitted, which the check would let pass: that is up to the builder, and looked
-    /// at in debug builds alone, as it takes as long as the sort of a fast build.
+    /// at in debug builds alone, as it takes as long as the sort of a fast build; and of compact nodes, whose links tell
+    /// fewer places apart.
     ///
     /// # Errors
     /// More nodes, leaves or primitives than their numbers can tell apart.
@@ -219,6 +219,10 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
         primitives: alloc::vec::Vec<u32>,
         bounds: Aabb,
     ) -> Result<Self, LayoutError> {
+        if N::NODES_FIRST {
+            let bounds = tested_bounds(&nodes, bounds);
+            return Self::from_parts(nodes, leaves, primitives, bounds);
+        }
         let root = check::root::<N, L>(nodes.len(), leaves.len(), primitives.len())?;
         debug_assert_eq!(
             check::check::<N, L, crate::layout::Owned>(&nodes, &leaves, &primitives, &bounds),
@@ -231,6 +235,13 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
     pub(crate) fn moving_parts(&mut self) -> (&mut alloc::vec::Vec<L>, &mut [N], &mut Aabb) {
         (&mut self.leaves, &mut self.nodes, &mut self.bounds)
     }
+}
+
+/// What holds the boxes of all nodes as they are tested, if `bounds` hold what is in them.
+#[cfg(feature = "std")]
+pub(crate) fn tested_bounds<N: WideNode>(nodes: &[N], bounds: Aabb) -> Aabb {
+    let of_node = |node: &N| (0..N::WIDTH).fold(Aabb::EMPTY, |all, i| all.join(node.child_aabb(i)));
+    nodes.iter().map(of_node).fold(bounds, Aabb::join)
 }
 
 impl<N: WideNode, L: Leaves, S: Storage> fmt::Debug for Bvh<N, L, S> {

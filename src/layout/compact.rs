@@ -260,6 +260,8 @@ fn leaf(first: u32, start: u32, end: u32) -> Link {
 }
 
 impl<const W: usize, H: Head> CompactNode<W, H> {
+    const ORDERED: bool = true;
+
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let (mut aabbs, mut counts, mut len) = ([Aabb::EMPTY; W], [0; W], 0);
         let (mut nodes, mut units) = (None, None);

@@ -40,6 +40,8 @@ impl_wide_node!(Node4, 1, 4, F32x4, 112, S::low);
 impl_wide_node!(Node8, 2, 8, F32x8, 224, core::convert::identity);
 
 impl<const W: usize, A> Node<W, A> {
+    const ORDERED: bool = false;
+
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let mut node = Self {
             align: [],

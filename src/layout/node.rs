@@ -16,6 +16,10 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// In the header of [bytes](super::bytes).
     #[doc(hidden)]
     const KIND: u32;
+    /// Whether its children have to be nodes first and then leaves, and their boxes may grow: the builder sees to the
+    /// first, and to bounds that hold the second.
+    #[doc(hidden)]
+    const NODES_FIRST: bool;
     /// The ray in this node's terms, in a backend's vectors.
     #[doc(hidden)]
     type Slabs<S: Simd>: Copy;
@@ -84,7 +88,7 @@ pub(super) mod sealed {
 }
 
 /// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes, `$kind` in headers, that can
-/// - be made of children: `new`;
+/// - be made of children, say whether only of ordered ones: `new`, `ORDERED`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome: `lanes`, `present`;
@@ -104,6 +108,7 @@ macro_rules! impl_wide_node {
         impl $crate::layout::WideNode for $node {
             const WIDTH: usize = $width;
             const KIND: u32 = $kind;
+            const NODES_FIRST: bool = Self::ORDERED;
             type Slabs<S: Simd> = RaySlabs<$width, S::$vector>;
             type Lanes<S: Simd> = S::$vector;
 

@@ -187,6 +187,13 @@ impl<N: WideNode, S: Storage> Bvh<N, RunLeaf, S> {
     }
 }
 
+impl<'m, N: WideNode, S: Storage> Bvh<N, MeshLeaf<'m>, S> {
+    /// The mesh whose triangles these are.
+    pub fn mesh(&self) -> &TriangleMesh<'m> {
+        self.leaf_store()
+    }
+}
+
 /// A mesh has fewer triangles than a hierarchy that was to be put over it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshTooSmall {

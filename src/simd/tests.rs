@@ -1,6 +1,6 @@
 //! Every operation that decides a hit, on every backend of this machine, held to plain floats, bit for bit.
 
-use super::{Backend, F32x1, Lanes, Operation, Portable, Simd, Vector};
+use super::{Backend, F32x1, Operation, Portable, Simd, Vector};
 use core::hint::black_box;
 use fastrand::Rng;
 

@@ -10,7 +10,8 @@ use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{
-        Bvh, CompactNode4, CompactNode8, Node4, Node8, Owned, RunLeaf, TriangleLeaf, WideNode,
+        Borrowed, Bvh, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, Owned, RunLeaf, Storage,
+        TriangleLeaves, WideNode,
     },
     reference,
     simd::Backend,
@@ -49,21 +50,42 @@ pub struct Variants {
 impl Variants {
     pub fn new(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Self {
         let mut queries = Vec::new();
-        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        // Compact layouts read the mesh for as long as they are asked.
+        let (kept, kept_indices) = (leaked(positions.clone()), leaked(indices.clone()));
+        let mesh = TriangleMesh::new(kept, kept_indices).unwrap();
         let builder = Builder::new().drop_non_finite(true);
-        add_width(&mut queries, builder.build_as::<Node8>(&mesh).unwrap());
-        add_width(&mut queries, builder.build_as::<Node4>(&mesh).unwrap());
+        add_backends(
+            &mut queries,
+            "full",
+            builder.build_as::<Node8>(&mesh).unwrap(),
+        );
+        add_backends(
+            &mut queries,
+            "full",
+            builder.build_as::<Node4>(&mesh).unwrap(),
+        );
+        add_backends(
+            &mut queries,
+            "compact",
+            compact::<CompactNode8>(&builder, &mesh),
+        );
+        add_backends(
+            &mut queries,
+            "compact",
+            compact::<CompactNode4>(&builder, &mesh),
+        );
         for preset in [Preset::Balanced, Preset::Fast] {
             let builder = Builder::preset(preset).drop_non_finite(true);
-            let name = |width| format!("{preset:?}, {width}-wide");
+            let name = |kind| format!("{preset:?}, {kind}");
             let bvh = builder.build_as::<Node8>(&mesh).unwrap();
-            add(&mut queries, name(8), bvh);
+            add(&mut queries, name("8-wide"), bvh);
             let bvh = builder.build_as::<Node4>(&mesh).unwrap();
-            add(&mut queries, name(4), bvh);
+            add(&mut queries, name("4-wide"), bvh);
+            let bvh = compact::<CompactNode8>(&builder, &mesh);
+            add(&mut queries, name("compact"), bvh);
+            let bvh = builder.build_as::<CompactNode8>(&mesh).unwrap();
+            add(&mut queries, name("compact with leaves"), bvh);
         }
-        let (p, i) = (&positions, &indices);
-        add_compact::<CompactNode8>(&mut queries, p, i, builder.build_compact(&mesh).unwrap());
-        add_compact::<CompactNode4>(&mut queries, p, i, builder.build_compact(&mesh).unwrap());
         Self {
             positions,
             indices,
@@ -107,45 +129,43 @@ impl Variants {
     }
 }
 
-fn add_width<N: WideNode + Sync>(queries: &mut Vec<Query>, bvh: Bvh<N, TriangleLeaf, Owned>) {
+/// Memory that stays: tests are short.
+fn leaked<T>(memory: T) -> &'static T {
+    Box::leak(Box::new(memory))
+}
+
+fn compact<N: WideNode>(
+    builder: &Builder,
+    mesh: &TriangleMesh<'static>,
+) -> Bvh<N, MeshLeaf<'static>, Borrowed<'static>> {
+    let tree: Bvh<N, RunLeaf, Owned> = builder.build_compact(mesh).unwrap();
+    leaked(tree).over(mesh).unwrap()
+}
+
+fn add_backends<N: WideNode + Sync, L: TriangleLeaves, S: Storage>(
+    queries: &mut Vec<Query>,
+    kind: &str,
+    bvh: Bvh<N, L, S>,
+) where
+    Bvh<N, L, S>: Clone + Sync + 'static,
+{
     for backend in Backend::available() {
         let mut bvh = bvh.clone();
         bvh.set_backend(backend);
-        add(
-            queries,
-            format!("{}-wide, {}", N::WIDTH, backend.name()),
-            bvh,
-        );
+        let name = format!("{kind}, {}-wide, {}", N::WIDTH, backend.name());
+        add(queries, name, bvh);
     }
 }
 
-fn add<N: WideNode + Sync>(
+fn add<N: WideNode, L: TriangleLeaves, S: Storage>(
     queries: &mut Vec<Query>,
     name: String,
-    bvh: Bvh<N, TriangleLeaf, Owned>,
-) {
+    bvh: Bvh<N, L, S>,
+) where
+    Bvh<N, L, S>: Sync + 'static,
+{
     let query = move |ray: &Ray| (bvh.closest_hit(ray), bvh.any_hit(ray));
     queries.push((name, Box::new(query)));
-}
-
-fn add_compact<N: WideNode + Sync>(
-    queries: &mut Vec<Query>,
-    positions: &[[f32; 3]],
-    indices: &[[u32; 3]],
-    compact: Bvh<N, RunLeaf, Owned>,
-) {
-    for backend in Backend::available() {
-        let mut compact = compact.clone();
-        compact.set_backend(backend);
-        let (positions, indices) = (positions.to_vec(), indices.to_vec());
-        let query = move |ray: &Ray| {
-            let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-            let bvh = compact.over(&mesh).unwrap();
-            (bvh.closest_hit(ray), bvh.any_hit(ray))
-        };
-        let name = format!("compact {}-wide, {}", N::WIDTH, backend.name());
-        queries.push((name, Box::new(query)));
-    }
 }
 
 /// A hit as bits, for -0 to differ from 0.

@@ -1,5 +1,7 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
+mod aligned;
+mod corrupt;
 mod effort;
 mod engines;
 mod error;
@@ -31,6 +33,7 @@ enum Command {
     Race(race::Args),
     Stress(stress::Args),
     Error(error::Args),
+    Corrupt(corrupt::Args),
 }
 
 fn main() -> ExitCode {
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         Command::Race(args) => race::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Error(args) => error::run(&args),
+        Command::Corrupt(args) => corrupt::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -69,9 +69,12 @@ const SEEN_FROM_INSIDE: [&str; 4] = ["abyss", "kitchen", "mansion", "temple"];
 /// [`default_scene`] has a place of its own; anything else is seen whole, from outside,
 /// in front, to the right and above.
 pub fn cameras_for(mesh: &Mesh) -> Vec<Camera> {
-    let (min, max) = mesh.bounds();
+    cameras_of(&mesh.name, mesh.bounds())
+}
+
+/// The cameras for a mesh of that name and those bounds.
+pub fn cameras_of(name: &str, (min, max): ([f32; 3], [f32; 3])) -> Vec<Camera> {
     let (min, max) = (Vec3::from(min), Vec3::from(max));
-    let name = mesh.name.as_str();
     if name == default_scene::NAME {
         vec![default_scene::camera()]
     } else if SEEN_FROM_INSIDE.contains(&name) {

@@ -9,7 +9,7 @@ mod load;
 mod mesh;
 pub mod shapes;
 
-pub use camera::{Camera, cameras_for};
+pub use camera::{Camera, cameras_for, cameras_of};
 pub use default_scene::default_scene;
 pub use load::{LoadError, Reason, load};
-pub use mesh::Mesh;
+pub use mesh::{Mesh, bounds};

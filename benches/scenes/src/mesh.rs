@@ -20,18 +20,7 @@ impl Mesh {
     /// The least and the greatest corner of the box around every finite vertex that a triangle uses;
     /// both are the origin if there is none.
     pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
-        let mut used = self
-            .indices
-            .iter()
-            .flatten()
-            .filter_map(|&index| self.positions.get(index as usize))
-            .map(|&position| Vec3::from_array(position))
-            .filter(|position| position.is_finite());
-        let Some(first) = used.next() else {
-            return Default::default();
-        };
-        let (min, max) = used.fold((first, first), |(min, max), p| (min.min(p), max.max(p)));
-        (min.to_array(), max.to_array())
+        bounds(&self.positions, &self.indices)
     }
 
     /// Adds the triangles of `other`, with its vertices kept apart from those already here.
@@ -55,6 +44,21 @@ impl Mesh {
         }
         self
     }
+}
+
+/// [`Mesh::bounds`], of a mesh's buffers.
+pub fn bounds(positions: &[[f32; 3]], indices: &[[u32; 3]]) -> ([f32; 3], [f32; 3]) {
+    let mut used = indices
+        .iter()
+        .flatten()
+        .filter_map(|&index| positions.get(index as usize))
+        .map(|&position| Vec3::from_array(position))
+        .filter(|position| position.is_finite());
+    let Some(first) = used.next() else {
+        return Default::default();
+    };
+    let (min, max) = used.fold((first, first), |(min, max), p| (min.min(p), max.max(p)));
+    (min.to_array(), max.to_array())
 }
 
 #[cfg(test)]

@@ -48,8 +48,8 @@ impl Case {
     }
 }
 
-/// FNV-1a.
-fn hash(name: &str, seed: u64, number: u64) -> u64 {
+/// A seed of a name and two numbers: FNV-1a.
+pub fn hash(name: &str, seed: u64, number: u64) -> u64 {
     let numbers = [seed, number].map(u64::to_le_bytes);
     name.bytes()
         .chain(numbers.into_iter().flatten())

@@ -12,6 +12,7 @@ mod variants;
 
 use crate::output;
 use case::Case;
+pub use case::hash;
 use check::Violation;
 use families::{FAMILIES, Family};
 use indicatif::{ProgressBar, ProgressStyle};

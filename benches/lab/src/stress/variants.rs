@@ -1,13 +1,17 @@
 //! Every way to ask this crate, held to the same answers.
 //!
 //! Three places grow with the crate: [`BUILDS`] by the builder's presets, [`check`] by layouts and widths,
-//! [`ask`] by kinds of call.
+//! [`ask`] by kinds of call. What is opened from bytes has to answer as what was written.
 
 use super::flush::flushed;
+use crate::aligned::AlignedBytes;
 use wide_bvh::{
     build::{BinaryTree, BuildError, Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Node8, Owned, Storage, TriangleLeaf, WideNode},
+    layout::{
+        Borrowed, Bvh, CompactNode4, CompactNode8, InBytes, MeshLeaf, Node4, Node8, Open, Owned,
+        RunLeaf, Storage, TriangleLeaf, TriangleLeaves, WideNode,
+    },
     simd::Backend,
     traverse::Scratch,
 };
@@ -76,7 +80,9 @@ pub fn check(
     flush: bool,
 ) -> Result<u64, Mismatch> {
     Ok(check_width::<Node8>(mesh, tree, rays, expected, flush)?
-        + check_width::<Node4>(mesh, tree, rays, expected, flush)?)
+        + check_width::<Node4>(mesh, tree, rays, expected, flush)?
+        + check_compact::<CompactNode8>(mesh, rays, expected, flush)?
+        + check_compact::<CompactNode4>(mesh, rays, expected, flush)?)
 }
 
 fn check_width<N: WideNode>(
@@ -86,7 +92,7 @@ fn check_width<N: WideNode>(
     expected: &[Option<Hit>],
     flush: bool,
 ) -> Result<u64, Mismatch> {
-    let finite = mesh.positions().iter().flatten().all(|x| x.is_finite());
+    let finite = is_finite(mesh);
     let mut checked = 0;
     let mut known: Vec<Bvh<N, TriangleLeaf, Owned>> = Vec::new();
     for build in &BUILDS {
@@ -108,25 +114,94 @@ fn check_width<N: WideNode>(
         }
         for backend in backends(known.is_empty(), rays) {
             bvh.set_backend(backend);
-            let ask = || {
-                let name = || format!("{name}, {}", backend.name());
-                ask(&bvh, name, rays, expected)
-            };
-            checked += if flush { flushed(ask)? } else { ask()? };
+            let name = || format!("{name}, {}", backend.name());
+            checked += flushed_if(flush, || ask(&bvh, name, rays, expected))?;
         }
         let some = &rays[..rays.len() / 8];
-        let ask = || {
-            ask(
-                &bvh.as_borrowed(),
-                || format!("{name}, borrowed"),
-                some,
-                expected,
-            )
+        checked += if known.is_empty() {
+            let name = format!("{name}, opened");
+            let bytes = written(&bvh, &name)?;
+            let bvh = opened::<N, TriangleLeaf>(&bytes, &name)?;
+            flushed_if(flush, || ask(&bvh, || name.clone(), some, expected))?
+        } else {
+            let name = || format!("{name}, borrowed");
+            flushed_if(flush, || ask(&bvh.as_borrowed(), name, some, expected))?
         };
-        checked += if flush { flushed(ask)? } else { ask()? };
         known.push(bvh);
     }
     Ok(checked)
+}
+
+/// Compact nodes over the mesh itself; also opened, without the mesh in the bytes and with it.
+fn check_compact<N: WideNode>(
+    mesh: &TriangleMesh,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    flush: bool,
+) -> Result<u64, Mismatch> {
+    let mut checked = 0;
+    for (number, build) in BUILDS.iter().filter(|build| !build.from_tree).enumerate() {
+        let name = format!("{}, {}-wide, compact", build.name, N::WIDTH);
+        let builder = (build.builder)().drop_non_finite(!is_finite(mesh));
+        let tree = builder.build_compact::<N>(mesh);
+        let tree = tree.map_err(|error| no_build(&name, error))?;
+        let mut bvh = tree.over(mesh).map_err(|error| no_build(&name, error))?;
+        for backend in backends(number == 0, rays) {
+            bvh.set_backend(backend);
+            let name = || format!("{name}, {}", backend.name());
+            checked += flushed_if(flush, || ask_one_by_one(&bvh, name, rays, expected))?;
+        }
+        if number > 0 {
+            continue;
+        }
+        let some = &rays[..rays.len() / 8];
+        let name = format!("{name}, opened");
+        let bytes = written(&tree, &name)?;
+        let alone = opened::<N, RunLeaf>(&bytes, &name)?;
+        let alone = alone.over(mesh).map_err(|error| no_build(&name, error))?;
+        checked += flushed_if(flush, || {
+            ask_one_by_one(&alone, || name.clone(), some, expected)
+        })?;
+        let name = format!("{name} with its mesh");
+        let bytes = written(&bvh, &name)?;
+        let whole = opened::<N, MeshLeaf>(&bytes, &name)?;
+        checked += flushed_if(flush, || {
+            ask_one_by_one(&whole, || name.clone(), some, expected)
+        })?;
+    }
+    Ok(checked)
+}
+
+fn is_finite(mesh: &TriangleMesh) -> bool {
+    mesh.positions().iter().flatten().all(|x| x.is_finite())
+}
+
+fn no_build(variant: &str, error: impl std::error::Error) -> Mismatch {
+    Mismatch {
+        ray: None,
+        variant: variant.to_owned(),
+        got: error.to_string(),
+    }
+}
+
+fn flushed_if<T>(flush: bool, ask: impl FnOnce() -> T) -> T {
+    if flush { flushed(ask) } else { ask() }
+}
+
+/// A hierarchy as bytes, where any may be opened.
+fn written<N: WideNode, L: InBytes, S: Storage>(
+    bvh: &Bvh<N, L, S>,
+    variant: &str,
+) -> Result<AlignedBytes, Mismatch> {
+    let bytes = bvh.to_bytes().map_err(|error| no_build(variant, error))?;
+    Ok(AlignedBytes::new(&bytes))
+}
+
+fn opened<'a, N: WideNode, L: Open<'a>>(
+    bytes: &'a AlignedBytes,
+    variant: &str,
+) -> Result<Bvh<N, L, Borrowed<'a>>, Mismatch> {
+    Bvh::from_bytes(bytes).map_err(|error| no_build(variant, error))
 }
 
 /// Every backend for the first build, and one for the others, from case to case another: it is other trees that they are
@@ -161,11 +236,27 @@ fn ask<N: WideNode, S: Storage>(
     rays: &[Ray],
     expected: &[Option<Hit>],
 ) -> Result<u64, Mismatch> {
-    let wrong = |ray: usize, call: &str, got: String| Mismatch {
+    let one_by_one = ask_one_by_one(bvh, &name, rays, expected)?;
+    Ok(one_by_one + ask_at_once(bvh, wrong(name), rays, expected)?)
+}
+
+/// A call that was answered wrong.
+fn wrong(name: impl Fn() -> String) -> impl Fn(usize, &str, String) -> Mismatch {
+    move |ray, call, got| Mismatch {
         ray: Some(ray),
         variant: format!("{}, {call}", name()),
         got,
-    };
+    }
+}
+
+/// A ray a call.
+fn ask_one_by_one<N: WideNode, L: TriangleLeaves, S: Storage>(
+    bvh: &Bvh<N, L, S>,
+    name: impl Fn() -> String,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+) -> Result<u64, Mismatch> {
+    let wrong = wrong(name);
     let mut checked = 0;
     for (place, (ray, expected)) in rays.iter().zip(expected).enumerate() {
         let hit = bvh.closest_hit(ray);
@@ -186,7 +277,7 @@ fn ask<N: WideNode, S: Storage>(
             checked += 1;
         }
     }
-    Ok(checked + ask_at_once(bvh, wrong, rays, expected)?)
+    Ok(checked)
 }
 
 /// Batches over all rays, and packets of eight.

@@ -1,0 +1,56 @@
+//! Baked files of triangles, opened as what they say they are.
+
+use wide_bvh::{
+    geometry::{Aabb, Hit, Ray},
+    layout::{
+        Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, Storage,
+        TriangleLeaf, TriangleLeaves, WideNode, bytes::Header,
+    },
+    simd::Backend,
+};
+
+/// A hierarchy over triangles, of whatever nodes and leaves.
+pub trait Opened {
+    /// Its bounds.
+    fn bounds(&self) -> &Aabb;
+    /// The closest hit, and whether there is any.
+    fn ask(&self, ray: &Ray) -> (Option<Hit>, bool);
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Opened for Bvh<N, L, S> {
+    fn bounds(&self) -> &Aabb {
+        self.bounds()
+    }
+
+    fn ask(&self, ray: &Ray) -> (Option<Hit>, bool) {
+        (self.closest_hit(ray), self.any_hit(ray))
+    }
+}
+
+/// Opens bytes in place as one kind of hierarchy, which will use the backend.
+pub type Open = for<'a> fn(&'a [u8], Backend) -> Result<Box<dyn Opened + 'a>, BytesError>;
+
+/// How to open a file with this header, if its leaves are triangles.
+pub fn opener(header: &Header) -> Option<Open> {
+    match (header.node_kind, header.leaf_kind) {
+        (1, 1) => Some(leaves::<Node4>),
+        (2, 1) => Some(leaves::<Node8>),
+        (1, 3) => Some(runs::<Node4>),
+        (2, 3) => Some(runs::<Node8>),
+        (3, 3) => Some(runs::<CompactNode4>),
+        (4, 3) => Some(runs::<CompactNode8>),
+        _ => None,
+    }
+}
+
+fn leaves<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened + '_>, BytesError> {
+    let mut bvh = Bvh::<N, TriangleLeaf, Borrowed>::from_bytes(bytes)?;
+    bvh.set_backend(backend);
+    Ok(Box::new(bvh))
+}
+
+fn runs<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened + '_>, BytesError> {
+    let mut bvh = Bvh::<N, MeshLeaf, Borrowed>::from_bytes(bytes)?;
+    bvh.set_backend(backend);
+    Ok(Box::new(bvh))
+}

@@ -1,0 +1,124 @@
+//! The command line.
+
+use lexopt::{Arg, Parser, ValueExt};
+use std::{ffi::OsString, path::PathBuf};
+
+/// What `--help` prints.
+pub const HELP: &str = "\
+Builds the hierarchy over a mesh and writes it as bytes, to be opened in place by `Bvh::from_bytes`:
+memory-mapped, from flash, from `include_bytes!`, without a copy, an allocation or `std`.
+
+Usage: bake MESH OUT [OPTIONS]
+
+  MESH                 a PLY, OBJ or glTF file
+  OUT                  the file to write, whose name ends in .wbvh
+  -w, --width N        children a node, 4 or 8 [8]
+  -l, --layout LAYOUT  compact: small nodes; leaves are numbers of triangles, which are read where the mesh
+                       has them [the default]
+                       full: nodes of whole floats, leaves that have the triangles: faster, larger; no mesh
+                       in the file
+      --without-mesh   compact without the mesh: for who has that in memory already, see `Bvh::over`
+  -h, --help           this text
+
+`cargo run --release --example render -- OUT` shows what is in it.";
+
+/// What the user wants.
+pub enum Request {
+    /// To know what can be wanted.
+    Help,
+    /// A file.
+    Bake(Args),
+}
+
+/// What to build, and how.
+pub struct Args {
+    /// The mesh's file.
+    pub mesh: PathBuf,
+    /// The file to write.
+    pub out: PathBuf,
+    /// How many children a node has.
+    pub width: Width,
+    /// Nodes and leaves.
+    pub layout: Layout,
+}
+
+/// How many children a node has.
+#[derive(Clone, Copy)]
+pub enum Width {
+    /// 4.
+    Four,
+    /// 8.
+    Eight,
+}
+
+/// Nodes and leaves.
+#[derive(Clone, Copy)]
+pub enum Layout {
+    /// Small nodes; leaves that read the mesh, which is in the file or not.
+    Compact {
+        /// Whether it is in the file.
+        with_mesh: bool,
+    },
+    /// Nodes of whole floats, leaves that have the triangles.
+    Full,
+}
+
+/// Reads the program's own arguments.
+pub fn parse() -> Result<Request, lexopt::Error> {
+    let (mut mesh, mut out) = (None, None);
+    let (mut width, mut compact, mut with_mesh) = (Width::Eight, true, true);
+    let mut parser = Parser::from_env();
+    while let Some(argument) = parser.next()? {
+        match argument {
+            Arg::Short('h') | Arg::Long("help") => return Ok(Request::Help),
+            Arg::Short('w') | Arg::Long("width") => {
+                width = parser.value()?.parse_with(parse_width)?;
+            }
+            Arg::Short('l') | Arg::Long("layout") => {
+                compact = parser.value()?.parse_with(is_compact)?;
+            }
+            Arg::Long("without-mesh") => with_mesh = false,
+            Arg::Value(path) if mesh.is_none() => mesh = Some(file(path)?),
+            Arg::Value(path) if out.is_none() => out = Some(file(path)?),
+            other => return Err(other.unexpected()),
+        }
+    }
+    let mesh = mesh.ok_or("which mesh? see --help")?;
+    let out: PathBuf = out.ok_or("into which file? see --help")?;
+    if !out.extension().is_some_and(|extension| extension == "wbvh") {
+        // A mesh named there by mistake is not overwritten.
+        return Err(format!("{}: a baked file's name ends in .wbvh", out.display()).into());
+    }
+    Ok(Request::Bake(Args {
+        mesh,
+        out,
+        width,
+        layout: match compact {
+            true => Layout::Compact { with_mesh },
+            false => Layout::Full,
+        },
+    }))
+}
+
+fn file(path: OsString) -> Result<PathBuf, lexopt::Error> {
+    match path.is_empty() {
+        true => Err("a file's name is empty".into()),
+        false => Ok(path.into()),
+    }
+}
+
+fn parse_width(text: &str) -> Result<Width, &'static str> {
+    match text {
+        "4" => Ok(Width::Four),
+        "8" => Ok(Width::Eight),
+        _ => Err("it is 4 or 8"),
+    }
+}
+
+fn is_compact(text: &str) -> Result<bool, &'static str> {
+    match text {
+        "compact" => Ok(true),
+        "full" => Ok(false),
+        _ => Err("it is compact or full"),
+    }
+}

@@ -1,0 +1,133 @@
+//! Builds the hierarchy over a mesh and writes it as bytes, to be opened in place.
+//!
+//! `cargo run --release --example bake -- --help` tells what can be asked for; `render` takes what it writes.
+
+mod args;
+#[path = "../render/say.rs"]
+mod say;
+
+use args::{Args, Layout, Request, Width};
+use indicatif::ProgressBar;
+use say::say;
+use std::{
+    error::Error,
+    fs,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+use wide_bvh::{
+    build::Builder,
+    geometry::TriangleMesh,
+    layout::{CompactNode4, CompactNode8, Node4, Node8, WideNode},
+};
+use wide_bvh_scenes::{Mesh, load};
+
+fn main() -> ExitCode {
+    let outcome = match args::parse() {
+        Ok(Request::Help) => {
+            say(args::HELP);
+            Ok(())
+        }
+        Ok(Request::Bake(args)) => bake(&args),
+        Err(error) => Err(error.into()),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bake: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn bake(args: &Args) -> Result<(), Box<dyn Error>> {
+    let mesh = load(&args.mesh)?;
+    let spinner = ProgressBar::new_spinner().with_message("building");
+    spinner.enable_steady_tick(Duration::from_millis(80));
+    let baked = match (args.layout, args.width) {
+        (Layout::Compact { with_mesh }, Width::Four) => compact::<CompactNode4>(&mesh, with_mesh),
+        (Layout::Compact { with_mesh }, Width::Eight) => compact::<CompactNode8>(&mesh, with_mesh),
+        (Layout::Full, Width::Four) => full::<Node4>(&mesh),
+        (Layout::Full, Width::Eight) => full::<Node8>(&mesh),
+    };
+    spinner.finish_and_clear();
+    let baked = baked.map_err(|error| format!("{}: {error}", args.mesh.display()))?;
+    fs::write(&args.out, &baked.bytes)
+        .map_err(|error| format!("{}: cannot be written: {error}", args.out.display()))?;
+
+    let all = mesh.indices.len();
+    let kept = all - baked.dropped;
+    say(format_args!("triangles   {kept} of {:?}", mesh.name));
+    if baked.dropped > 0 {
+        let dropped = baked.dropped;
+        say(format_args!(
+            "dropped     {dropped} of {all} triangles: a vertex is not finite"
+        ));
+    }
+    say(format_args!(
+        "build       {:.2} s",
+        baked.time.as_secs_f64()
+    ));
+    for (name, bytes) in baked.parts {
+        let a_triangle = bytes as f64 / kept.max(1) as f64;
+        say(format_args!("{name:<11} {a_triangle:.1} bytes a triangle"));
+    }
+    let (len, out) = (baked.bytes.len(), args.out.display());
+    say(format_args!("file        {len} bytes, {out}"));
+    Ok(())
+}
+
+/// What was made.
+struct Baked {
+    bytes: Vec<u8>,
+    time: Duration,
+    dropped: usize,
+    /// Bytes of each part, of which there are any.
+    parts: Vec<(&'static str, usize)>,
+}
+
+fn compact<N: WideNode>(mesh: &Mesh, with_mesh: bool) -> Result<Baked, Box<dyn Error>> {
+    let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
+    let start = Instant::now();
+    let tree = builder().build_compact::<N>(&triangles)?;
+    let time = start.elapsed();
+    let mut parts = vec![
+        ("nodes", size_of_val(tree.nodes())),
+        ("leaf data", size_of_val(tree.primitives())),
+    ];
+    let bytes = match with_mesh {
+        true => {
+            let (positions, indices) = (&*mesh.positions, &*mesh.indices);
+            parts.push(("mesh", size_of_val(positions) + size_of_val(indices)));
+            tree.over(&triangles)?.to_bytes()?
+        }
+        false => tree.to_bytes()?,
+    };
+    Ok(Baked {
+        bytes,
+        time,
+        dropped: tree.dropped(),
+        parts,
+    })
+}
+
+fn full<N: WideNode>(mesh: &Mesh) -> Result<Baked, Box<dyn Error>> {
+    let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
+    let start = Instant::now();
+    let bvh = builder().build_as::<N>(&triangles)?;
+    let time = start.elapsed();
+    let leaf_data = size_of_val(bvh.leaves()) + size_of_val(bvh.primitives());
+    Ok(Baked {
+        bytes: bvh.to_bytes()?,
+        time,
+        dropped: bvh.dropped(),
+        parts: vec![
+            ("nodes", size_of_val(bvh.nodes())),
+            ("leaf data", leaf_data),
+        ],
+    })
+}
+
+fn builder() -> Builder<'static> {
+    Builder::new().drop_non_finite(true)
+}

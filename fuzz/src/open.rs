@@ -1,0 +1,81 @@
+//! Bytes opened as every kind of hierarchy, and what opens asked in every way.
+
+use crate::{
+    Answers, Liar,
+    ask::{ask, ask_mesh, ask_primitives},
+};
+use wide_bvh::{
+    geometry::{Aabb, Ray, TriangleMesh},
+    layout::{
+        Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, Open,
+        PrimitiveLeaf, RunLeaf, TriangleLeaf, WideNode,
+    },
+};
+
+/// What bytes opened as.
+#[derive(Debug)]
+pub struct Opened {
+    /// Of each ray, in every way.
+    pub answers: Vec<Answers>,
+    /// Written again.
+    pub bytes: Vec<u8>,
+    /// The number of each primitive in the leaves.
+    pub primitives: Vec<u32>,
+}
+
+/// Opens bytes as every kind of nodes with every kind of leaves, and asks what opens. `mesh` is what leaves are put over
+/// that have none of their own; `boxes` are a caller's primitives.
+///
+/// One outcome for each kind, always in the same order.
+pub fn open(
+    bytes: &[u8],
+    rays: &[Ray],
+    mesh: &TriangleMesh,
+    boxes: &[Aabb],
+) -> Vec<Result<Opened, BytesError>> {
+    let given = Given { rays, mesh, boxes };
+    let mut outcomes = Vec::new();
+    outcomes.extend(of_nodes::<Node4>(bytes, &given));
+    outcomes.extend(of_nodes::<Node8>(bytes, &given));
+    outcomes.extend(of_nodes::<CompactNode4>(bytes, &given));
+    outcomes.extend(of_nodes::<CompactNode8>(bytes, &given));
+    outcomes
+}
+
+struct Given<'a> {
+    rays: &'a [Ray],
+    mesh: &'a TriangleMesh<'a>,
+    boxes: &'a [Aabb],
+}
+
+#[inline(never)]
+fn of_nodes<N: WideNode>(bytes: &[u8], given: &Given) -> [Result<Opened, BytesError>; 4] {
+    let Given { rays, mesh, boxes } = *given;
+    [
+        opened::<N, TriangleLeaf>(bytes, |bvh| ask(bvh, rays, u64::MAX)),
+        opened::<N, PrimitiveLeaf>(bytes, |bvh| ask_primitives(bvh, &Liar(boxes), rays)),
+        opened::<N, RunLeaf>(bytes, |bvh| match bvh.over(mesh) {
+            Ok(bvh) => ask_mesh(bvh, rays),
+            Err(error) => {
+                assert!(error.needed > mesh.len() as u64);
+                Vec::new()
+            }
+        }),
+        opened::<N, MeshLeaf>(bytes, |bvh| ask_mesh(bvh, rays)),
+    ]
+}
+
+fn opened<'a, N: WideNode, L: Open<'a> + 'a>(
+    bytes: &'a [u8],
+    ask: impl FnOnce(Bvh<N, L, Borrowed<'a>>) -> Vec<Answers>,
+) -> Result<Opened, BytesError> {
+    let bvh = Bvh::<N, L, Borrowed>::from_bytes(bytes).inspect_err(|error| {
+        assert!(!error.to_string().is_empty());
+    })?;
+    assert!(!format!("{bvh:?}").is_empty());
+    Ok(Opened {
+        bytes: bvh.to_bytes().expect("as many as there were"),
+        primitives: bvh.primitives().to_vec(),
+        answers: ask(bvh),
+    })
+}
