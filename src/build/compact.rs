@@ -16,11 +16,16 @@ use std::vec::Vec;
 pub(super) fn compact<N: WideNode, C: WideNode>(
     full: &Bvh<N, PrimitiveLeaf, Owned>,
 ) -> Result<Bvh<C, RunLeaf, Owned>, LayoutError> {
+    // In the leaves' order, which fast builds do not have them in.
+    let mut primitives = Vec::with_capacity(full.primitives().len());
+    let run = |leaf: &PrimitiveLeaf| {
+        let (first, range) = (primitives.len(), leaf.range());
+        primitives.extend_from_slice(&full.primitives()[range.clone()]);
+        run_place(first as u32, range.len() as u32)
+    };
+    let runs: Vec<u32> = full.leaves().iter().map(run).collect();
     let place = |child: Child| match child.kind() {
-        ChildKind::Leaf(leaf) => {
-            let range = full.leaves()[leaf].range();
-            Child::leaf(run_place(range.start as u32, range.len() as u32))
-        }
+        ChildKind::Leaf(leaf) => Child::leaf(runs[leaf]),
         _ => child,
     };
     let node = |node: &N| {
@@ -37,6 +42,6 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
     };
     let nodes: Vec<C> = full.nodes().iter().map(node).collect();
     let bounds = tested_bounds(&nodes, *full.bounds());
-    let compact = Bvh::from_parts(nodes, (), full.primitives().to_vec(), bounds)?;
+    let compact = Bvh::from_parts(nodes, (), primitives, bounds)?;
     Ok(compact.with_dropped(full.dropped() as u32))
 }
