@@ -119,7 +119,7 @@ fn compact_ones_there_and_back() {
 /// Compact nodes take their children in one order only, nodes before leaves. The builder has to give them that order, and
 /// bounds that hold their larger boxes, with leaves of whatever kind; moved, too.
 #[test]
-fn compact_nodes_over_leaves_of_their_own() {
+fn compact_nodes_of_every_preset() {
     let scene = Scene::new(500);
     let mesh = scene.mesh();
     let full: Bvh8 = Builder::new().build(&mesh).unwrap();
@@ -128,15 +128,20 @@ fn compact_nodes_over_leaves_of_their_own() {
     let full_moved: Bvh8 = Builder::new().build(&moved).unwrap();
     for preset in [Preset::Best, Preset::Balanced, Preset::Fast] {
         let builder = Builder::preset(preset);
-        over_own_leaves::<CompactNode8>(&builder, &mesh, &scene.rays, &full);
-        over_own_leaves::<CompactNode4>(&builder, &mesh, &scene.rays, &full);
+        of_both_leaves::<CompactNode8>(&builder, &mesh, &scene.rays, &full);
+        of_both_leaves::<CompactNode4>(&builder, &mesh, &scene.rays, &full);
     }
     let mut bvh = Builder::new().build_as::<CompactNode8>(&mesh).unwrap();
     bvh.refit(&moved).unwrap();
     same_hits(&bvh, &scene.rays, &full_moved);
 }
 
-fn over_own_leaves<N: WideNode>(builder: &Builder, mesh: &TriangleMesh, rays: &[Ray], full: &Bvh8) {
+fn of_both_leaves<N: WideNode>(builder: &Builder, mesh: &TriangleMesh, rays: &[Ray], full: &Bvh8) {
+    let compact = builder.build_compact::<N>(mesh).unwrap();
+    for ray in rays {
+        let hit = compact.over(mesh).unwrap().closest_hit(ray);
+        assert_eq!(bits(hit), bits(full.closest_hit(ray)));
+    }
     let bvh = builder.build_as::<N>(mesh).unwrap();
     same_hits(&bvh, rays, full);
     there_and_back(&bvh, |bytes| {

@@ -160,6 +160,7 @@ impl Baked {
     /// Leaves that read the mesh, which is in the file or not.
     fn runs<N: WideNode + Sync>(&self) -> Result<Opened<'_>, Box<dyn Error>> {
         match Bvh::<N, MeshLeaf, Borrowed>::from_bytes(&self.map) {
+            Ok(_) if self.over.is_some() => Err("its mesh is in it: it takes no --over".into()),
             Ok(bvh) => Ok((*bvh.mesh(), Box::new(bvh))),
             Err(BytesError::MeshTooSmall(small)) if small.triangles == 0 => {
                 let tree = Bvh::<N, RunLeaf, Borrowed>::from_bytes(&self.map)?;
