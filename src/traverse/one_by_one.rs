@@ -83,6 +83,8 @@ mod tests {
     use glam::Vec3;
     use wide_bvh_scenes::shapes;
 
+    type Ask<'a> = &'a dyn Fn(&Ray, bool) -> Option<Hit>;
+
     /// Targets that have vectors never come here but in this test.
     #[test]
     fn gives_the_references_answers() {
@@ -99,7 +101,7 @@ mod tests {
             let compact_eight: CompactBvh8 = builder.build_compact(&view).unwrap();
             let over_four = compact_four.over(&view).unwrap();
             let over_eight = compact_eight.over(&view).unwrap();
-            let layouts: [&dyn Fn(&Ray, bool) -> Option<Hit>; 4] = [
+            let layouts: [Ask; 4] = [
                 &|ray, any| find(&four, ray, any),
                 &|ray, any| find(&eight, ray, any),
                 &|ray, any| find(&over_four, ray, any),

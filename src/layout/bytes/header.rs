@@ -48,20 +48,6 @@ const NODE_SIZES: [u64; 4] = [112, 224, 48, 80];
 /// Bytes of a leaf, by kind less 1.
 const LEAF_SIZES: [u64; 3] = [128, 8, 0];
 
-/// Where the sections are, and where they end.
-pub(super) struct Places {
-    pub sections: [Range<usize>; 5],
-    len: usize,
-}
-
-impl Places {
-    /// How many bytes there are in all.
-    #[cfg(feature = "alloc")]
-    pub fn len(&self) -> usize {
-        self.len
-    }
-}
-
 impl Header {
     /// That of a hierarchy with so many bytes of leaves, and so many positions and triangles.
     ///
@@ -139,16 +125,19 @@ impl Header {
                 found: bytes.len(),
             });
         }
-        Ok(self.places().sections)
+        Ok(self.places())
     }
 
     /// The sections' places, none of which is past what a `usize` counts.
-    pub(super) fn places(&self) -> Places {
-        let (sections, end) = self.ends();
-        Places {
-            sections: sections.map(|Range { start, end }| start as usize..end as usize),
-            len: end as usize,
-        }
+    pub(super) fn places(&self) -> [Range<usize>; 5] {
+        let place = |Range { start, end }: Range<u64>| start as usize..end as usize;
+        self.ends().0.map(place)
+    }
+
+    /// How many bytes there are in all.
+    #[cfg(feature = "alloc")]
+    pub(super) fn len(&self) -> usize {
+        self.ends().1 as usize
     }
 
     /// The sections' places, and where the last one's padding ends.

@@ -24,7 +24,6 @@ pub(super) use header::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES};
 use super::{Borrowed, Bvh, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode};
 use crate::geometry::TriangleMesh;
 use bytemuck::{Pod, cast_slice};
-use core::ops::Range;
 
 /// Bytes that start at a multiple of 64, as [`from_bytes`](Bvh::from_bytes) may want: around an `include_bytes!`, say.
 ///
@@ -182,10 +181,8 @@ impl<N: WideNode, L: InBytes, S: Storage> Bvh<N, L, S> {
     pub fn to_bytes(&self) -> Result<alloc::vec::Vec<u8>, BytesError> {
         let (leaves, positions, indices) = L::sections::<S>(self.leaf_store());
         let header = Header::new::<N, L>(self, leaves.len(), positions.len(), indices.len())?;
-        let places = header.places();
-        let mut bytes = alloc::vec![0; places.len()];
-        let mut put = |place: Range<usize>, section: &[u8]| bytes[place].copy_from_slice(section);
-        put(0..size_of::<Header>(), bytemuck::bytes_of(&header));
+        let mut bytes = alloc::vec![0; header.len()];
+        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
         let sections = [
             cast_slice(self.nodes()),
             leaves,
@@ -193,8 +190,8 @@ impl<N: WideNode, L: InBytes, S: Storage> Bvh<N, L, S> {
             cast_slice(positions),
             cast_slice(indices),
         ];
-        for (place, section) in places.sections.into_iter().zip(sections) {
-            put(place, section);
+        for (place, section) in header.places().into_iter().zip(sections) {
+            bytes[place].copy_from_slice(section);
         }
         seal(&mut bytes);
         Ok(bytes)
