@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 95 to 120 | 0.79 |
-/// | [`Balanced`](Self::Balanced) | 430 to 540 | 0.95 |
-/// | [`Best`](Self::Best) | 1,400 to 1,850 | 1 |
+/// | [`Fast`](Self::Fast) | 55 to 92 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 290 to 520 | 0.95 |
+/// | [`Best`](Self::Best) | 910 to 1,430 | 1 |
 ///
 /// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
