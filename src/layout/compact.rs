@@ -55,7 +55,7 @@ impl Frame {
     fn new<const W: usize>(aabbs: &[Aabb]) -> (Self, [[[u8; W]; 2]; 3]) {
         let mut frame = Self::zeroed();
         let mut planes = [[[0; W]; 2]; 3];
-        for axis in 0..3 {
+        for (axis, [los, his]) in planes.iter_mut().enumerate() {
             let side = |x: f32| x.clamp(-MOST, MOST) + 0.0;
             let lo = |aabb: &Aabb| side(aabb.min[axis]);
             let hi = |aabb: &Aabb| side(aabb.max[axis]);
@@ -68,7 +68,6 @@ impl Frame {
             while frame.above(axis, end).is_none() {
                 frame.steps[axis] += 1;
             }
-            let [los, his] = &mut planes[axis];
             for (lane, aabb) in aabbs.iter().enumerate().take(W) {
                 los[lane] = frame.below(axis, lo(aabb));
                 his[lane] = frame.above(axis, hi(aabb)).unwrap_or(u8::MAX);
