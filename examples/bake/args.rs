@@ -85,7 +85,7 @@ pub fn parse() -> Result<Request, lexopt::Error> {
     }
     let mesh = mesh.ok_or("which mesh? see --help")?;
     let out: PathBuf = out.ok_or("into which file? see --help")?;
-    if !out.extension().is_some_and(|extension| extension == "wbvh") {
+    if out.extension().is_none_or(|extension| extension != "wbvh") {
         // A mesh named there by mistake is not overwritten.
         return Err(format!("{}: a baked file's name ends in .wbvh", out.display()).into());
     }
