@@ -362,3 +362,84 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
         V::links(token, ends, base, stride, places.units)
     }
 }
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use super::*;
+    use crate::{
+        layout::WideNode,
+        simd::{Backend, Lanes, Operation},
+    };
+    use fastrand::Rng;
+    use std::vec::Vec;
+
+    /// A node's children: nodes first, then leaves, of boxes anywhere, of any size.
+    fn children<const W: usize>(rng: &mut Rng) -> Vec<(Aabb, Child)> {
+        let count = rng.usize(1..=W);
+        let nodes = rng.usize(0..=count);
+        let (mut node, mut unit) = (rng.u32(..1 << 27), rng.u32(..1 << 27));
+        let scale = f32::exp2(rng.i32(-120..120) as f32);
+        let center = Vec3::new(rng.f32(), rng.f32(), rng.f32()) * rng.u32(..100_000) as f32 * scale;
+        let mut child = |lane| {
+            let mut corner = || center + (Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5) * scale;
+            let (a, b) = (corner(), corner());
+            // Some are flat.
+            let b = if rng.bool() {
+                b
+            } else {
+                Vec3::new(a.x, b.y, b.z)
+            };
+            let link = if lane < nodes {
+                node += 1;
+                Child::node(node)
+            } else {
+                let len = rng.u32(1..=8);
+                unit += len;
+                Child::leaf(run::place(unit - len, len))
+            };
+            (Aabb::new(a.min(b), a.max(b)), link)
+        };
+        (0..count).map(&mut child).collect()
+    }
+
+    fn check<N: WideNode, const W: usize>() {
+        struct Links<'a, N>(&'a N);
+        impl<N: WideNode> Operation for Links<'_, N> {
+            type Output = Vec<u32>;
+            fn run<S: Simd>(self, token: S) -> Vec<u32> {
+                let links = self.0.link_lanes(token).to_array();
+                links.as_ref().iter().map(|link| link.to_bits()).collect()
+            }
+        }
+
+        let mut rng = Rng::with_seed(5);
+        for _ in 0..20_000 {
+            let children = children::<W>(&mut rng);
+            let node = N::from_children(children.iter().copied());
+            for (lane, &(aabb, child)) in children.iter().enumerate() {
+                assert_eq!(node.child(lane), child);
+                let tested = node.child_aabb(lane);
+                let most = Vec3::splat(MOST);
+                let aabb = Aabb::new(aabb.min.clamp(-most, most), aabb.max.clamp(-most, most));
+                assert_eq!(tested.join(aabb), tested, "{aabb:?} is not in {tested:?}");
+            }
+            for lane in children.len()..W {
+                assert_eq!(node.child(lane), Child::EMPTY);
+                assert_eq!(node.child_aabb(lane), Aabb::EMPTY);
+            }
+            for backend in Backend::available() {
+                let links = backend.run(Links(&node));
+                for (lane, link) in links.into_iter().enumerate().take(children.len()) {
+                    // SAFETY: there is such a lane.
+                    assert_eq!(link, unsafe { node.link(lane) }.to_bits());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn children_are_where_they_were_put() {
+        check::<CompactNode4, 4>();
+        check::<CompactNode8, 8>();
+    }
+}
