@@ -241,7 +241,10 @@ fn kind(error: &impl std::fmt::Debug) -> String {
     let text = format!("{error:?}");
     let end = text.find([' ', '{']).unwrap_or(text.len());
     let name = text[..end].trim_end_matches(|c: char| !c.is_ascii_alphabetic());
-    name.replace('(', " ")
+    match name.split_once('(') {
+        Some((outer, inner)) if outer == inner => outer.to_owned(),
+        _ => name.replace('(', " "),
+    }
 }
 
 fn table(as_they_are: &Counts, resealed: &Counts) -> String {
