@@ -8,8 +8,8 @@ use wide_bvh::{
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{
         Aligned, Borrowed, Bvh, Bvh4, Bvh8, BytesError, CompactBvh4, CompactBvh8, CompactNode4,
-        CompactNode8, InBytes, MeshBvh4, MeshBvh8, MeshLeaf, Node4, Node8, Open, PrimitiveLeaf,
-        RunLeaf, Storage, TriangleLeaf, WideNode, bytes::seal,
+        CompactNode8, InBytes, LayoutError, MeshBvh4, MeshBvh8, MeshLeaf, Node4, Node8, Open,
+        PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, bytes::seal,
     },
 };
 
@@ -311,4 +311,24 @@ fn what_is_wrong_is_said() {
         error::<Node8, TriangleLeaf>(shifted),
         Some(BytesError::Misaligned { needed: 32 | 64 })
     ));
+}
+
+/// A link has a node's place in units of 16 bytes: one that leads to the middle of a node is refused.
+#[test]
+fn a_link_to_the_middle_of_a_node() {
+    let scene = Scene::new(500);
+    let bvh: Bvh8 = Builder::new().build(&scene.mesh()).unwrap();
+    let opened = |nodes: &[Node8]| {
+        let (leaves, primitives) = (bvh.leaves(), bvh.primitives());
+        Bvh::<Node8, TriangleLeaf, Borrowed>::from_parts(nodes, leaves, primitives, *bvh.bounds())
+            .map(|_| ())
+    };
+    let mut nodes = bvh.nodes().to_vec();
+    assert_eq!(opened(&nodes), Ok(()));
+    // The links are the last 8 words of a node's 56; those of leaves have the highest bit set.
+    let words: &mut [u32] = bytemuck::cast_slice_mut(&mut nodes);
+    let link = (48..56).find(|&place| words[place] >> 31 == 0).unwrap();
+    words[link] += 1;
+    let lane = link - 48;
+    assert_eq!(opened(&nodes), Err(LayoutError::Child { node: 0, lane }));
 }
