@@ -132,6 +132,12 @@ fn one_ray() {
     });
 }
 
+#[track_caller]
+fn assert_occluded(occluded: &[bool], truth: &[Option<Hit>]) {
+    let mut pairs = occluded.iter().zip(truth);
+    assert!(pairs.all(|(&any, hit)| any == hit.is_some()));
+}
+
 /// Fewer lanes than rays, so that lanes are used again with what is left in them.
 #[test]
 fn waves() {
@@ -143,12 +149,7 @@ fn waves() {
             bvh.any_hits_in(&mut scratch, rays, &mut occluded);
         });
         assert_eq!(hits, truth);
-        assert!(
-            occluded
-                .iter()
-                .zip(truth)
-                .all(|(&any, hit)| any == hit.is_some())
-        );
+        assert_occluded(&occluded, truth);
     });
 }
 
@@ -163,12 +164,7 @@ fn bundles_and_batches() {
                 bvh.any_hits(&rays[..count], &mut occluded);
             });
             assert_eq!(hits, truth[..count]);
-            assert!(
-                occluded
-                    .iter()
-                    .zip(truth)
-                    .all(|(&any, hit)| any == hit.is_some())
-            );
+            assert_occluded(&occluded, truth);
         }
     });
 }

@@ -3,9 +3,9 @@
 use crate::{
     geometry::Aabb,
     layout::{
-        Bvh, Child, ChildKind, LayoutError, Owned, PrimitiveLeaf, RunLeaf, WideNode, run_place,
-        tested_bounds,
+        Bvh, Child, ChildKind, LayoutError, Owned, PrimitiveLeaf, RunLeaf, WideNode, tested_bounds,
     },
+    simd::packed_run,
 };
 use std::vec::Vec;
 
@@ -21,7 +21,7 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
     let run = |leaf: &PrimitiveLeaf| {
         let first = primitives.len() as u32;
         primitives.extend_from_slice(&full.primitives()[leaf.range()]);
-        Child::leaf(run_place(first, leaf.range().len() as u32))
+        Child::leaf(packed_run(first, leaf.range().len() as u32))
     };
     let runs: Vec<Child> = full.leaves().iter().map(run).collect();
     let place = |child: Child| match child.kind() {

@@ -9,7 +9,7 @@ use super::{Child, ChildKind, Link, node::impl_wide_node};
 use crate::{
     geometry::{Aabb, Ray},
     layout::run,
-    simd::{Simd, Vector},
+    simd::{Simd, Vector, packed_run},
     slab::{BundleSlabs, FirstPlanes, NarrowSlabs, RaySlabs, pow2},
 };
 use bytemuck::{Pod, Zeroable};
@@ -252,7 +252,7 @@ impl Head for Head4 {
 /// The leaf of the primitives from `start` to `end` after the first of a node's.
 #[inline(always)]
 fn leaf(first: u32, start: u32, end: u32) -> Link {
-    Link::leaf_at(run::place(
+    Link::leaf_at(packed_run(
         first.wrapping_add(start),
         end.wrapping_sub(start),
     ))
@@ -395,7 +395,7 @@ mod tests {
             } else {
                 let len = rng.u32(1..=8);
                 unit += len;
-                Child::leaf(run::place(unit - len, len))
+                Child::leaf(packed_run(unit - len, len))
             };
             (Aabb::new(a.min(b), a.max(b)), link)
         };

@@ -29,7 +29,6 @@ pub use full::{Node, Node4, Node8};
 pub use leaf::{Leaf, PrimitiveLeaf, TriangleLeaf};
 pub use leaves::{Leaves, TriangleLeaves, Triangles};
 pub use node::WideNode;
-pub(crate) use run::place as run_place;
 pub use run::{MeshLeaf, MeshTooSmall, RunLeaf, Runs};
 #[cfg(feature = "alloc")]
 pub use storage::Owned;

@@ -4,27 +4,20 @@ use super::{Borrowed, Bvh, LayoutError, Leaves, Storage, Triangles, WideNode};
 use crate::{
     geometry::TriangleMesh,
     primitive::triangle::{Corners, RayShear},
-    simd::{Lanes, Simd},
+    simd::{Lanes, RUN_FIRST_BITS, Simd, packed_run},
 };
 use core::{error::Error, fmt, ops::Range};
 
 /// The most primitives of a run.
 pub(crate) const MAX_RUN: usize = 8;
-/// How many bits of a place say where a run begins; those above say how long it is, less 1.
-const FIRST_BITS: u32 = 28;
-const FIRST: u32 = (1 << FIRST_BITS) - 1;
-
-/// The place, as links have it, of `count` primitives from number `first` of the list on, 1 to 8 in number.
-#[inline(always)]
-pub(crate) const fn place(first: u32, count: u32) -> u32 {
-    first & FIRST | (count.wrapping_sub(1) & 7) << FIRST_BITS
-}
+/// The bits of a place that say where a run begins.
+const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 
 /// The run at a place.
 #[inline(always)]
 pub(crate) const fn of_place(place: usize) -> Range<usize> {
     let first = place & FIRST as usize;
-    first..first + (place >> FIRST_BITS & 7) + 1
+    first..first + (place >> RUN_FIRST_BITS & 7) + 1
 }
 
 /// Leaves of up to 8 primitives, which are read from an `M`.
@@ -58,7 +51,7 @@ impl<M: Copy> Leaves for Runs<M> {
     fn only(count: usize) -> Option<u32> {
         (1..=MAX_RUN)
             .contains(&count)
-            .then(|| place(0, count as u32))
+            .then(|| packed_run(0, count as u32))
     }
 
     fn count<S: Storage>(_: &M, primitives: &[u32]) -> Result<usize, LayoutError> {

@@ -5,7 +5,6 @@
 //! `permute`, `replace`) give the same bits on every backend. `mul_add`, `min` and `max` may differ in rounding,
 //! NaN and the sign of zero; the box test uses them, and is conservative.
 
-use crate::layout::run_place;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 /// A proof that the processor has a backend's instructions.
@@ -147,9 +146,8 @@ pub trait Vector<const N: usize>:
     /// A comparison's outcome that is set in the lanes that `bits` has a bit for.
     fn of_bits(token: Self::Token, bits: u32) -> Self;
 
-    /// Bits, lane by lane: of lane `i` with `ends[i]` 0, `base + i · stride`; of others, `first` plus the end before, with a
-    /// number of three bits from bit 28 on, how far this end is from that one, less 1, and bit 31 set. It is how compact
-    /// nodes say where their children are: see [`layout`](crate::layout).
+    /// Bits, lane by lane: of lane `i` with `ends[i]` 0, `base + i · stride`; of others, with bit 31 set, the
+    /// [packed run](packed_run) from `first` and the end before it to `first` and this end.
     #[inline(always)]
     fn links(token: Self::Token, ends: &[u8; N], base: u32, stride: u32, first: u32) -> Self {
         let mut links = [0.0; N];
@@ -158,7 +156,7 @@ pub trait Vector<const N: usize>:
             let end = u32::from(end);
             let link = match end {
                 0 => base.wrapping_add(lane * stride),
-                _ => 1 << 31 | run_place(first.wrapping_add(start), end.wrapping_sub(start)),
+                _ => 1 << 31 | packed_run(first.wrapping_add(start), end.wrapping_sub(start)),
             };
             links[lane as usize] = f32::from_bits(link);
             start = end;
@@ -168,6 +166,15 @@ pub trait Vector<const N: usize>:
 
     /// Lane `i` becomes lane `lanes[i]` modulo `N`.
     fn permute(self, lanes: &[u8; N]) -> Self;
+}
+
+/// How many bits of a run say where it begins; those above say how long it is, less 1.
+pub(crate) const RUN_FIRST_BITS: u32 = 28;
+
+/// A run of `count` things, 1 to 8, from number `first` on, in 31 bits.
+#[inline(always)]
+pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
+    first & ((1 << RUN_FIRST_BITS) - 1) | (count.wrapping_sub(1) & 7) << RUN_FIRST_BITS
 }
 
 /// Three numbers, each in every lane of its vector.

@@ -1,9 +1,12 @@
 //! The first bytes: what follows, and how much of it.
 
 use super::{ALIGN, BytesError};
-use crate::geometry::Aabb;
 #[cfg(feature = "alloc")]
-use crate::layout::{Bvh, Storage, WideNode, bytes::InBytes};
+use crate::layout::{Bvh, Storage};
+use crate::{
+    geometry::Aabb,
+    layout::{WideNode, bytes::InBytes},
+};
 use bytemuck::{Pod, Zeroable};
 use core::ops::Range;
 
@@ -43,24 +46,18 @@ const _: () = assert!(size_of::<Header>() == 128);
 const MAGIC: [u8; 8] = *b"wide-bvh";
 const BYTE_ORDER: u32 = 0x0102_0304;
 const VERSION: u32 = 1;
-/// Bytes of a node, by kind less 1.
-const NODE_SIZES: [u64; 4] = [112, 224, 48, 80];
-/// Bytes of a leaf, by kind less 1.
-const LEAF_SIZES: [u64; 3] = [128, 8, 0];
-
 impl Header {
-    /// That of a hierarchy with so many bytes of leaves, and so many positions and triangles.
+    /// That of a hierarchy with so many leaves, positions and triangles.
     ///
     /// # Errors
     /// More positions than can be counted.
     #[cfg(feature = "alloc")]
     pub(super) fn new<N: WideNode, L: InBytes>(
         bvh: &Bvh<N, L, impl Storage>,
-        leaf_bytes: usize,
+        leaves: usize,
         positions: usize,
         triangles: usize,
     ) -> Result<Self, BytesError> {
-        let leaf_size = LEAF_SIZES[L::KIND as usize - 1].max(1);
         let Aabb { min, max } = *bvh.bounds();
         Ok(Self {
             magic: MAGIC,
@@ -69,7 +66,7 @@ impl Header {
             node_kind: N::KIND,
             leaf_kind: L::KIND,
             nodes: bvh.nodes().len() as u32,
-            leaves: (leaf_bytes as u64 / leaf_size) as u32,
+            leaves: leaves as u32,
             primitives: bvh.primitives().len() as u32,
             positions: u32::try_from(positions).map_err(|_| BytesError::TooMany("positions"))?,
             triangles: triangles as u32,
@@ -117,38 +114,37 @@ impl Header {
     ///
     /// # Errors
     /// There are more bytes or fewer than for those.
-    pub(super) fn sections(&self, bytes: &[u8]) -> Result<[Range<usize>; 5], BytesError> {
-        let (_, end) = self.ends();
+    pub(super) fn sections<N: WideNode, L: InBytes>(
+        &self,
+        bytes: &[u8],
+    ) -> Result<[Range<usize>; 5], BytesError> {
+        let (_, end) = self.ends::<N, L>();
         if end != bytes.len() as u64 {
             return Err(BytesError::Length {
                 expected: end,
                 found: bytes.len(),
             });
         }
-        Ok(self.places())
+        Ok(self.places::<N, L>())
     }
 
     /// The sections' places, none of which is past what a `usize` counts.
-    pub(super) fn places(&self) -> [Range<usize>; 5] {
+    pub(super) fn places<N: WideNode, L: InBytes>(&self) -> [Range<usize>; 5] {
         let place = |Range { start, end }: Range<u64>| start as usize..end as usize;
-        self.ends().0.map(place)
+        self.ends::<N, L>().0.map(place)
     }
 
     /// How many bytes there are in all.
     #[cfg(feature = "alloc")]
-    pub(super) fn len(&self) -> usize {
-        self.ends().1 as usize
+    pub(super) fn len<N: WideNode, L: InBytes>(&self) -> usize {
+        self.ends::<N, L>().1 as usize
     }
 
     /// The sections' places, and where the last one's padding ends.
-    fn ends(&self) -> ([Range<u64>; 5], u64) {
-        let size = |sizes: &[u64], kind: u32| {
-            let size = sizes.get((kind as usize).wrapping_sub(1));
-            size.copied().unwrap_or(0)
-        };
+    fn ends<N: WideNode, L: InBytes>(&self) -> ([Range<u64>; 5], u64) {
         let lengths = [
-            u64::from(self.nodes) * size(&NODE_SIZES, self.node_kind),
-            u64::from(self.leaves) * size(&LEAF_SIZES, self.leaf_kind),
+            u64::from(self.nodes) * size_of::<N>() as u64,
+            u64::from(self.leaves) * L::SIZE as u64,
             u64::from(self.primitives) * 4,
             u64::from(self.positions) * 12,
             u64::from(self.triangles) * 12,

@@ -45,6 +45,9 @@ pub trait InBytes: Leaves {
     /// In the header.
     #[doc(hidden)]
     const KIND: u32;
+    /// Bytes of a leaf; 0 if none is stored.
+    #[doc(hidden)]
+    const SIZE: usize;
     /// What there is to write: the leaves, and of a mesh the positions and indices.
     #[doc(hidden)]
     fn sections<S: Storage>(store: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]);
@@ -69,6 +72,7 @@ pub trait Open<'a>: InBytes {
 
 impl<L: Leaf> InBytes for L {
     const KIND: u32 = <L as Leaf>::KIND;
+    const SIZE: usize = size_of::<L>();
 
     fn sections<S: Storage>(store: &S::Slice<L>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
         (cast_slice(store), &[], &[])
@@ -87,6 +91,7 @@ impl<'a, L: Leaf> Open<'a> for L {
 
 impl InBytes for RunLeaf {
     const KIND: u32 = header::RUNS;
+    const SIZE: usize = 0;
 
     fn sections<S: Storage>((): &()) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
         (&[], &[], &[])
@@ -105,6 +110,7 @@ impl<'a> Open<'a> for RunLeaf {
 
 impl InBytes for MeshLeaf<'_> {
     const KIND: u32 = header::RUNS;
+    const SIZE: usize = 0;
 
     fn sections<S: Storage>(mesh: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
         (&[], mesh.positions(), mesh.indices())
@@ -137,7 +143,7 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, BytesError> {
         let header = Header::read(bytes)?;
         header.expect(N::KIND, L::KIND)?;
-        let [nodes, leaves, primitives, positions, indices] = header.sections(bytes)?;
+        let [nodes, leaves, primitives, positions, indices] = header.sections::<N, L>(bytes)?;
         checksum::check(bytes)?;
         let store = L::open(
             &bytes[leaves],
@@ -180,8 +186,13 @@ impl<N: WideNode, L: InBytes, S: Storage> Bvh<N, L, S> {
     /// More positions than the header can count.
     pub fn to_bytes(&self) -> Result<alloc::vec::Vec<u8>, BytesError> {
         let (leaves, positions, indices) = L::sections::<S>(self.leaf_store());
-        let header = Header::new::<N, L>(self, leaves.len(), positions.len(), indices.len())?;
-        let mut bytes = alloc::vec![0; header.len()];
+        let header = Header::new(
+            self,
+            leaves.len().checked_div(L::SIZE).unwrap_or(0),
+            positions.len(),
+            indices.len(),
+        )?;
+        let mut bytes = alloc::vec![0; header.len::<N, L>()];
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
         let sections = [
             cast_slice(self.nodes()),
@@ -190,7 +201,7 @@ impl<N: WideNode, L: InBytes, S: Storage> Bvh<N, L, S> {
             cast_slice(positions),
             cast_slice(indices),
         ];
-        for (place, section) in header.places().into_iter().zip(sections) {
+        for (place, section) in header.places::<N, L>().into_iter().zip(sections) {
             bytes[place].copy_from_slice(section);
         }
         seal(&mut bytes);
