@@ -1,7 +1,10 @@
 //! This crate's compact hierarchies: nodes of 80 and 48 bytes, leaves that read the mesh's own buffers.
 
-use super::{Batch, Built, Chosen, Engine, Takes, timed};
-use std::{error::Error, rc::Rc};
+use super::{
+    Batch, Built, Chosen, Engine, Takes, timed,
+    wide_bvh::{AllAtOnce, Call, OneByOne, pool},
+};
+use std::{error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
     build::Builder,
     geometry::{Hit, Ray, TriangleMesh},
@@ -28,37 +31,53 @@ fn of_width<'m, N: WideNode + Send + 'm>(
 ) -> Result<Vec<Box<dyn Engine + 'm>>, Box<dyn Error>> {
     let name = format!("wide-bvh {} compact {}", N::WIDTH, Backend::detect().name());
     let batch = format!("{name} batch");
-    let mut calls = vec![(name, Takes::OneRay), (batch, Takes::Batches)];
-    calls.retain(|(name, _)| chosen(name));
-    if calls.is_empty() {
+    let mut kinds: Vec<(String, Make<'m, N>)> = vec![
+        (name, Compact::<N, OneByOne>::boxed),
+        (batch, Compact::<N, AllAtOnce>::boxed),
+    ];
+    kinds.retain(|(name, _)| chosen(name));
+    if kinds.is_empty() {
         return Ok(Vec::new());
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let (tree, time) = pool.install(|| timed(|| Builder::new().build_compact::<N>(mesh)));
+    let (tree, time) = pool(1)?.install(|| timed(|| Builder::new().build_compact::<N>(mesh)));
     let tree = Rc::new(tree?);
     let bytes = tree.bytes();
-    let engine = |(name, takes): (String, Takes)| {
-        Box::new(Compact {
-            name,
-            built: Built { time, bytes },
-            tree: Rc::clone(&tree),
-            mesh: *mesh,
-            takes,
-        }) as Box<dyn Engine + 'm>
-    };
-    Ok(calls.into_iter().map(engine).collect())
+    let built = Built { time, bytes };
+    let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree), *mesh);
+    Ok(kinds.into_iter().map(engine).collect())
 }
 
+/// Makes an engine of the tree and its mesh.
+type Make<'m, N> =
+    fn(String, Built, Rc<Bvh<N, RunLeaf, Owned>>, TriangleMesh<'m>) -> Box<dyn Engine + 'm>;
+
 /// A tree that both calls share.
-struct Compact<'m, N: WideNode> {
+struct Compact<'m, N: WideNode, C> {
     name: String,
     built: Built,
     tree: Rc<Bvh<N, RunLeaf, Owned>>,
     mesh: TriangleMesh<'m>,
-    takes: Takes,
+    call: PhantomData<C>,
 }
 
-impl<N: WideNode> Engine for Compact<'_, N> {
+impl<'m, N: WideNode + 'm, C: Call + 'm> Compact<'m, N, C> {
+    fn boxed(
+        name: String,
+        built: Built,
+        tree: Rc<Bvh<N, RunLeaf, Owned>>,
+        mesh: TriangleMesh<'m>,
+    ) -> Box<dyn Engine + 'm> {
+        Box::new(Self {
+            name,
+            built,
+            tree,
+            mesh,
+            call: PhantomData,
+        })
+    }
+}
+
+impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
     fn name(&self) -> &str {
         &self.name
     }
@@ -72,7 +91,7 @@ impl<N: WideNode> Engine for Compact<'_, N> {
     }
 
     fn takes(&self) -> Takes {
-        self.takes
+        C::TAKES
     }
 
     fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a> {
@@ -80,37 +99,23 @@ impl<N: WideNode> Engine for Compact<'_, N> {
         Box::new(Rays {
             bvh: bvh.expect("the mesh that it was built on"),
             rays,
-            takes: self.takes,
+            call: PhantomData::<C>,
         })
     }
 }
 
-struct Rays<'a, N: WideNode> {
+struct Rays<'a, N: WideNode, C> {
     bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
     rays: &'a [Ray],
-    takes: Takes,
+    call: PhantomData<C>,
 }
 
-impl<N: WideNode> Batch for Rays<'_, N> {
+impl<N: WideNode, C: Call> Batch for Rays<'_, N, C> {
     fn closest(&self, hits: &mut [Option<Hit>]) {
-        match self.takes {
-            Takes::Batches => self.bvh.closest_hits(self.rays, hits),
-            Takes::OneRay => {
-                for (ray, hit) in self.rays.iter().zip(hits) {
-                    *hit = self.bvh.closest_hit(ray);
-                }
-            }
-        }
+        C::closest(&self.bvh, self.rays, hits);
     }
 
     fn any(&self, occluded: &mut [bool]) {
-        match self.takes {
-            Takes::Batches => self.bvh.any_hits(self.rays, occluded),
-            Takes::OneRay => {
-                for (ray, occluded) in self.rays.iter().zip(occluded) {
-                    *occluded = self.bvh.any_hit(ray);
-                }
-            }
-        }
+        C::any(&self.bvh, self.rays, occluded);
     }
 }

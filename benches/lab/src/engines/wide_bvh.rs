@@ -7,7 +7,7 @@ use std::{cell::RefCell, error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Node8, Owned, TriangleLeaf, WideNode},
+    layout::{Bvh, Node4, Node8, Owned, Storage, TriangleLeaf, TriangleLeaves, WideNode},
     simd::Backend,
 };
 
@@ -93,32 +93,48 @@ fn build<N: WideNode + Send>(
     Ok((Rc::new(RefCell::new(tree)), built))
 }
 
-fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
+pub(super) fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
     ThreadPoolBuilder::new().num_threads(threads).build()
 }
 
 /// How rays are handed over.
-trait Call {
+pub(super) trait Call {
     const TAKES: Takes;
 
-    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]);
+    fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    );
 
-    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]);
+    fn any<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    );
 }
 
 /// A ray a call.
-struct OneByOne;
+pub(super) struct OneByOne;
 
 impl Call for OneByOne {
     const TAKES: Takes = Takes::OneRay;
 
-    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) {
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = bvh.closest_hit(ray);
         }
     }
 
-    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]) {
+    fn any<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    ) {
         for (ray, occluded) in rays.iter().zip(occluded) {
             *occluded = bvh.any_hit(ray);
         }
@@ -126,16 +142,24 @@ impl Call for OneByOne {
 }
 
 /// All in one call.
-struct AllAtOnce;
+pub(super) struct AllAtOnce;
 
 impl Call for AllAtOnce {
     const TAKES: Takes = Takes::Batches;
 
-    fn closest<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) {
         bvh.closest_hits(rays, hits);
     }
 
-    fn any<N: WideNode>(bvh: &Triangles<N>, rays: &[Ray], occluded: &mut [bool]) {
+    fn any<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    ) {
         bvh.any_hits(rays, occluded);
     }
 }
