@@ -55,18 +55,4 @@ impl Ray {
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + t * self.direction
     }
-
-    /// The origin, and a number more: a load's worth.
-    #[inline(always)]
-    pub(crate) fn origin_and_more(&self) -> &[f32; 4] {
-        let numbers: &[f32; 8] = bytemuck::cast_ref(self);
-        numbers.first_chunk().unwrap_or(&[0.0; 4])
-    }
-
-    /// The direction, and a number more.
-    #[inline(always)]
-    pub(crate) fn direction_and_more(&self) -> &[f32; 4] {
-        let numbers: &[f32; 8] = bytemuck::cast_ref(self);
-        numbers[3..].first_chunk().unwrap_or(&[0.0; 4])
-    }
 }

@@ -10,7 +10,7 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::run,
     simd::{Simd, Vector, packed_run},
-    slab::{BundleSlabs, FirstPlanes, NarrowSlabs, RaySlabs, pow2},
+    slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs, pow2},
 };
 use bytemuck::{Pod, Zeroable};
 use core::fmt::Debug;

@@ -4,7 +4,7 @@ use super::{Child, Link, node::impl_wide_node};
 use crate::{
     geometry::{Aabb, Ray},
     simd::{Simd, Vector},
-    slab::{BundleSlabs, FirstPlanes, NarrowSlabs, RaySlabs},
+    slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

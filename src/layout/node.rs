@@ -4,7 +4,7 @@ use super::{Child, Link};
 use crate::{
     geometry::{Aabb, Ray},
     simd::{Lanes, Simd},
-    slab::{BundleSlabs, NarrowSlabs},
+    slab::{BundleSlabs, NarrowRay},
 };
 use bytemuck::Pod;
 use glam::Vec3;
@@ -61,7 +61,7 @@ pub trait WideNode: Pod + sealed::Sealed {
     fn child_planes(&self, lane: usize, direction: Vec3) -> [[f32; 3]; 2];
     /// The same from single numbers.
     #[doc(hidden)]
-    fn widen<S: Simd>(token: S, slabs: &NarrowSlabs) -> Self::Slabs<S>;
+    fn widen<S: Simd>(token: S, ray: &NarrowRay) -> Self::Slabs<S>;
     /// Where a lane leads to.
     ///
     /// # Safety
@@ -164,8 +164,8 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn widen<S: Simd>(token: S, slabs: &NarrowSlabs) -> Self::Slabs<S> {
-                slabs.widen(token)
+            fn widen<S: Simd>(token: S, ray: &NarrowRay) -> Self::Slabs<S> {
+                ray.widen(token)
             }
 
             #[inline(always)]

@@ -28,7 +28,7 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn columns(self, rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+    fn transpose(self, rows: [F32x8; 8]) -> [F32x8; 8] {
         // SAFETY: the token says that the instructions are there.
         unsafe { transpose(rows) }
     }
@@ -400,37 +400,22 @@ fn coordinates(points: [&[f32; 3]; 8]) -> [F32x8; 3] {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn transpose(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
-    // SAFETY: whole rows, unaligned.
-    let row = unsafe {
-        [
-            _mm256_loadu_ps(rows[0].as_ptr()),
-            _mm256_loadu_ps(rows[1].as_ptr()),
-            _mm256_loadu_ps(rows[2].as_ptr()),
-            _mm256_loadu_ps(rows[3].as_ptr()),
-            _mm256_loadu_ps(rows[4].as_ptr()),
-            _mm256_loadu_ps(rows[5].as_ptr()),
-            _mm256_loadu_ps(rows[6].as_ptr()),
-            _mm256_loadu_ps(rows[7].as_ptr()),
-        ]
-    };
+fn transpose(rows: [F32x8; 8]) -> [F32x8; 8] {
+    let [
+        F32x8(r0),
+        F32x8(r1),
+        F32x8(r2),
+        F32x8(r3),
+        F32x8(r4),
+        F32x8(r5),
+        F32x8(r6),
+        F32x8(r7),
+    ] = rows;
     // Pairs of rows, then fours, within each half of a vector; then the halves.
-    let (a, b) = (
-        _mm256_unpacklo_ps(row[0], row[1]),
-        _mm256_unpackhi_ps(row[0], row[1]),
-    );
-    let (c, d) = (
-        _mm256_unpacklo_ps(row[2], row[3]),
-        _mm256_unpackhi_ps(row[2], row[3]),
-    );
-    let (e, f) = (
-        _mm256_unpacklo_ps(row[4], row[5]),
-        _mm256_unpackhi_ps(row[4], row[5]),
-    );
-    let (g, h) = (
-        _mm256_unpacklo_ps(row[6], row[7]),
-        _mm256_unpackhi_ps(row[6], row[7]),
-    );
+    let (a, b) = (_mm256_unpacklo_ps(r0, r1), _mm256_unpackhi_ps(r0, r1));
+    let (c, d) = (_mm256_unpacklo_ps(r2, r3), _mm256_unpackhi_ps(r2, r3));
+    let (e, f) = (_mm256_unpacklo_ps(r4, r5), _mm256_unpackhi_ps(r4, r5));
+    let (g, h) = (_mm256_unpacklo_ps(r6, r7), _mm256_unpackhi_ps(r6, r7));
     const LOW: i32 = 0b01_00_01_00;
     const HIGH: i32 = 0b11_10_11_10;
     let (ac0, ac1) = (

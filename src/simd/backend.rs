@@ -65,6 +65,12 @@ impl Backend {
         }
     }
 
+    /// As [`run`](Self::run), by a call, so that what `operation` needs of registers is not taken from the caller's.
+    #[inline(never)]
+    pub(crate) fn call<O: Operation>(self, operation: O) -> O::Output {
+        self.run(operation)
+    }
+
     /// Does `operation` with this backend's instructions: one predictable branch.
     #[inline(always)]
     pub(crate) fn run<O: Operation>(self, operation: O) -> O::Output {

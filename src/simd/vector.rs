@@ -22,24 +22,14 @@ pub trait Simd: Copy {
 
     /// Eight rows of eight as columns.
     #[inline(always)]
-    fn columns(self, rows: &[[f32; 8]; 8]) -> [Self::F32x8; 8] {
+    fn transpose(self, rows: [Self::F32x8; 8]) -> [Self::F32x8; 8] {
         let mut columns = [[0.0; 8]; 8];
-        for (lane, row) in rows.iter().enumerate() {
-            for (column, &number) in columns.iter_mut().zip(row) {
+        for (lane, row) in rows.into_iter().enumerate() {
+            for (column, number) in columns.iter_mut().zip(row.to_array()) {
                 column[lane] = number;
             }
         }
-        let [a, b, c, d, e, f, g, h] = &columns;
-        [
-            Self::F32x8::load(self, a),
-            Self::F32x8::load(self, b),
-            Self::F32x8::load(self, c),
-            Self::F32x8::load(self, d),
-            Self::F32x8::load(self, e),
-            Self::F32x8::load(self, f),
-            Self::F32x8::load(self, g),
-            Self::F32x8::load(self, h),
-        ]
+        load_all(self, &columns)
     }
 
     /// Eight points' x, y and z.
@@ -175,6 +165,21 @@ pub(crate) const RUN_FIRST_BITS: u32 = 28;
 #[inline(always)]
 pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
     first & ((1 << RUN_FIRST_BITS) - 1) | (count.wrapping_sub(1) & 7) << RUN_FIRST_BITS
+}
+
+/// Eight vectors.
+#[inline(always)]
+pub fn load_all<S: Simd>(token: S, [a, b, c, d, e, f, g, h]: &[[f32; 8]; 8]) -> [S::F32x8; 8] {
+    [
+        S::F32x8::load(token, a),
+        S::F32x8::load(token, b),
+        S::F32x8::load(token, c),
+        S::F32x8::load(token, d),
+        S::F32x8::load(token, e),
+        S::F32x8::load(token, f),
+        S::F32x8::load(token, g),
+        S::F32x8::load(token, h),
+    ]
 }
 
 /// Three numbers, each in every lane of its vector.

@@ -71,8 +71,7 @@ mod prepared;
 
 pub use bundle::BundleSlabs;
 pub(crate) use bundle::{Bundling, most};
-pub use narrow::NarrowSlabs;
-pub(crate) use narrow::SceneExtent;
+pub use narrow::NarrowRay;
 pub(crate) use prepared::{PreparedRay, pow2, reciprocal, unscaled};
 
 use crate::{

@@ -1,95 +1,93 @@
-//! What the box test needs of a ray, a number each, for rays that wait for their turn.
+//! What the tests need of a ray, a number each, for rays that wait for their turn.
 
-use super::{
-    K_BOX, K_T, MAX_EXTENT, MIN_EXTENT, RaySlabs, UNIT_ROUNDOFF, first_planes, plane_terms, pow2,
-    prepared::{greater, lesser},
-};
+use super::{MAX_EXTENT, RaySlabs, first_planes, prepared::PreparedLanes};
 use crate::{
-    geometry::{Aabb, Ray},
-    simd::{Vector, splat3},
+    geometry::Aabb,
+    simd::{Lanes, Simd, Vector, splat3},
 };
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
-/// [`RaySlabs`] in a fifth of the memory. The fourth number of each row is of no meaning.
-#[derive(Clone, Copy)]
-#[repr(C, align(16))]
-pub struct NarrowSlabs {
-    reciprocal: [f32; 4],
-    near: [f32; 4],
-    far: [f32; 4],
-    first: [u32; 3],
+/// [`RaySlabs`] and more in one cache line.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct NarrowRay {
+    reciprocal: [f32; 3],
+    near: [f32; 3],
+    far: [f32; 3],
     t_min: f32,
     margin: f32,
+    first: [u32; 3],
+    along: f32,
+    axes: u32,
 }
 
-/// The largest coordinate of a scene's bounds, by axis.
-#[derive(Clone, Copy)]
-pub(crate) struct SceneExtent([f32; 4]);
+impl NarrowRay {
+    /// Of no meaning.
+    pub(crate) const NONE: Self = Self {
+        reciprocal: [0.0; 3],
+        near: [0.0; 3],
+        far: [0.0; 3],
+        t_min: 0.0,
+        margin: 0.0,
+        first: [0; 3],
+        along: 0.0,
+        axes: 0,
+    };
 
-impl SceneExtent {
-    pub(crate) fn new(bounds: &Aabb) -> Self {
-        let extent = bounds.min.abs().max(bounds.max.abs());
-        Self([extent.x, extent.y, extent.z, 0.0])
-    }
-}
-
-impl NarrowSlabs {
-    /// As [`RaySlabs::new`], an axis a lane, for nodes of `width` children; and whether they are to be
-    /// [opened](Self::open), where they are kept. `reciprocal` is that of the ray's direction.
+    /// Eight rays, for boxes within `bounds` in nodes of `width` children, and a bit for each that is [ordinary]
+    /// (PreparedLanes::ordinary) and not too far away. The others are of no meaning.
     #[inline(always)]
-    pub(crate) fn new<V: Vector<4>>(
-        token: V::Token,
-        ray: &Ray,
-        reciprocal: V,
-        scene: &SceneExtent,
+    pub(crate) fn eight<T: Simd>(
+        token: T,
+        origin: [T::F32x8; 3],
+        direction: [T::F32x8; 3],
+        range: [T::F32x8; 2],
+        bounds: &Aabb,
         width: usize,
-    ) -> (Self, bool) {
-        let origin = V::load(token, ray.origin_and_more());
-        let [x, y, z, _] = (V::load(token, &scene.0) + origin.abs()).to_array();
-        let extent = greater(greater(x, y), greater(z, MIN_EXTENT));
-        let error = V::splat(token, extent * (K_BOX * UNIT_ROUNDOFF));
-        let (near, far) = plane_terms(token, origin, reciprocal, error);
-        let [x, y, z, _] = reciprocal.abs().to_array();
-        let margin = extent * (K_T * UNIT_ROUNDOFF) * lesser(lesser(x, y), z);
+    ) -> ([Self; 8], u32) {
+        let prepared = PreparedLanes::new(token, origin, direction, range);
+        let PreparedLanes {
+            reciprocal,
+            along,
+            axes,
+            ordinary,
+        } = prepared;
+        let [t_min, _] = range;
+        let (slabs, extent) =
+            RaySlabs::of_lanes(token, origin, reciprocal, t_min, Vec3::ONE, bounds);
         let side = width * size_of::<f32>();
-        let slabs = Self {
-            reciprocal: reciprocal.to_array(),
-            near: near.to_array(),
-            far: far.to_array(),
-            first: [
-                first_planes(0, ray.direction.x, side) as u32,
-                first_planes(1, ray.direction.y, side) as u32,
-                first_planes(2, ray.direction.z, side) as u32,
-            ],
-            t_min: ray.t_min - margin,
-            margin,
-        };
-        let near = matches!(
-            extent.partial_cmp(&MAX_EXTENT),
-            Some(core::cmp::Ordering::Less)
-        );
-        (slabs, !near)
-    }
-
-    /// As [`RaySlabs`] does.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn open(&mut self) {
-        self.reciprocal = self.reciprocal.map(|r| pow2(-126).copysign(r));
-        self.near = [-f32::MAX; 4];
-        self.far = [f32::MAX; 4];
+        // Numbers of bytes, as bits.
+        let [mut x, mut y, mut z] = splat3(token, [0.0; 3]);
+        for (axis, first) in [&mut x, &mut y, &mut z].into_iter().enumerate() {
+            let negative = reciprocal[axis].lt(T::F32x8::splat(token, 0.0));
+            let [ahead, behind] = [1.0, -1.0].map(|sign| first_planes(axis, sign, side) as u32);
+            *first = negative.select(
+                T::F32x8::splat(token, f32::from_bits(behind)),
+                T::F32x8::splat(token, f32::from_bits(ahead)),
+            );
+        }
+        let [rx, ry, rz] = reciprocal;
+        let ([nx, ny, nz], [fx, fy, fz]) = (slabs.near, slabs.far);
+        let starts = token.transpose([rx, ry, rz, nx, ny, nz, fx, fy]);
+        let ends = token.transpose([fz, slabs.t_min, slabs.margin, x, y, z, along, axes]);
+        let mut rays = [Self::NONE; 8];
+        for ((ray, start), end) in rays.iter_mut().zip(starts).zip(ends) {
+            let [a, b]: &mut [[f32; 8]; 2] = bytemuck::cast_mut(ray);
+            (*a, *b) = (start.to_array(), end.to_array());
+        }
+        let near = extent.lt(T::F32x8::splat(token, MAX_EXTENT));
+        (rays, (ordinary & near).bits())
     }
 
     /// In every lane of vectors, for nodes of the width they were made for.
     #[inline(always)]
     pub(crate) fn widen<const N: usize, V: Vector<N>>(&self, token: V::Token) -> RaySlabs<N, V> {
-        let [rx, ry, rz, _] = self.reciprocal;
-        let [nx, ny, nz, _] = self.near;
-        let [fx, fy, fz, _] = self.far;
         let [x, y, z] = self.first;
         RaySlabs {
-            reciprocal: splat3(token, [rx, ry, rz]),
-            near: splat3(token, [nx, ny, nz]),
-            far: splat3(token, [fx, fy, fz]),
+            reciprocal: splat3(token, self.reciprocal),
+            near: splat3(token, self.near),
+            far: splat3(token, self.far),
             t_min: V::splat(token, self.t_min),
             margin: V::splat(token, self.margin),
             first: [x as usize, y as usize, z as usize],
@@ -100,5 +98,17 @@ impl NarrowSlabs {
     #[inline(always)]
     pub(crate) fn margin(&self) -> f32 {
         self.margin
+    }
+
+    /// The axes of the shear.
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> &'static [usize; 3] {
+        PreparedLanes::<f32>::axes(self.axes)
+    }
+
+    /// Of the direction's component along the last of them.
+    #[inline(always)]
+    pub(crate) fn along(&self) -> f32 {
+        self.along
     }
 }

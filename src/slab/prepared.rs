@@ -93,7 +93,6 @@ impl<'a> PreparedRay<'a> {
         [t_min, t_max]: [V; 2],
     ) -> bool {
         let all = u32::MAX >> (32 - N);
-        let zero = V::splat(token, 0.0);
         let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
         let largest = x.max(y).max(z);
         let along = [x.lt(largest), x.lt(largest) & y.lt(largest)];
@@ -102,13 +101,7 @@ impl<'a> PreparedRay<'a> {
             1 => largest.le(y) & along[0],
             _ => largest.le(z) & along[1],
         };
-        let zeros = origin[0] * zero + origin[1] * zero + origin[2] * zero;
-        let ordinary = axis
-            & V::splat(token, LEAST_DIRECTION).le(largest)
-            & largest.lt(V::splat(token, LONG_DIRECTION))
-            & zeros.le(zero)
-            & t_min.le(t_max)
-            & t_min.lt(V::splat(token, f32::INFINITY));
+        let ordinary = axis & ordinary(token, origin, direction, [t_min, t_max], largest);
         let mut alike = self.unscale == 1.0 && ordinary.bits() == all;
         for (axis, number) in direction.into_iter().enumerate() {
             let negative = self.ray.direction.as_ref()[axis].is_sign_negative();
@@ -136,12 +129,6 @@ impl<'a> PreparedRay<'a> {
         ]
     }
 
-    /// The reciprocals of the direction, an axis a lane. The fourth lane is of no meaning.
-    #[inline(always)]
-    pub(crate) fn reciprocal<V: Vector<4>>(&self, token: V::Token) -> V {
-        reciprocal(token, V::load(token, self.ray.direction_and_more()))
-    }
-
     /// What an accepted `t` is to be multiplied by for [`unscaled`](Self::unscaled).
     #[inline(always)]
     pub(crate) fn unscale(&self) -> f32 {
@@ -160,6 +147,75 @@ impl<'a> PreparedRay<'a> {
     pub(crate) fn unscaled(&self, t: f32, ray: &Ray) -> f32 {
         unscaled(t, self.unscale, ray)
     }
+}
+
+/// Rays, one a lane, as [`PreparedRay`] has them where it leaves them as they are.
+#[derive(Clone, Copy)]
+pub(crate) struct PreparedLanes<V> {
+    pub(crate) reciprocal: [V; 3],
+    /// That along the last axis of the shear.
+    pub(crate) along: V,
+    /// The number of the [axes](Self::axes) of the shear, as bits.
+    pub(crate) axes: V,
+    /// Which rays can hit something and need not be scaled. The others' numbers are of no meaning.
+    pub(crate) ordinary: V,
+}
+
+impl<V> PreparedLanes<V> {
+    #[inline(always)]
+    pub(crate) fn new<const N: usize>(
+        token: V::Token,
+        origin: [V; 3],
+        direction: [V; 3],
+        range: [V; 2],
+    ) -> Self
+    where
+        V: Vector<N>,
+    {
+        let [dx, dy, dz] = direction;
+        let [rx, ry, rz] = [
+            reciprocal(token, dx),
+            reciprocal(token, dy),
+            reciprocal(token, dz),
+        ];
+        let largest = dx.abs().max(dy.abs()).max(dz.abs());
+        let (not_x, not_y) = (dx.abs().lt(largest), dy.abs().lt(largest));
+        let number = |bits| V::splat(token, f32::from_bits(bits));
+        let along = not_x.select(not_y.select(rz, ry), rx);
+        let pair = not_x.select(not_y.select(number(4), number(2)), number(0));
+        Self {
+            reciprocal: [rx, ry, rz],
+            along,
+            axes: pair | (along.lt(V::splat(token, 0.0)) & number(1)),
+            ordinary: ordinary(token, origin, direction, range, largest),
+        }
+    }
+
+    /// The axes of a number.
+    #[inline(always)]
+    pub(crate) fn axes(number: u32) -> &'static [usize; 3] {
+        &SHEAR_AXES[number as usize % 8]
+    }
+}
+
+/// Which rays, `largest` being the largest component of their directions, can hit something and need not be scaled.
+#[inline(always)]
+fn ordinary<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    origin: [V; 3],
+    direction: [V; 3],
+    [t_min, t_max]: [V; 2],
+    largest: V,
+) -> V {
+    // 0 times a finite number is 0, times any other NaN.
+    let zero = V::splat(token, 0.0);
+    let of_origin = origin[0] * zero + origin[1] * zero + origin[2] * zero;
+    let of_direction = direction[0] * zero + direction[1] * zero + direction[2] * zero;
+    V::splat(token, LEAST_DIRECTION).le(largest)
+        & largest.lt(V::splat(token, LONG_DIRECTION))
+        & (of_origin + of_direction).le(zero)
+        & t_min.le(t_max)
+        & t_min.lt(V::splat(token, f32::INFINITY))
 }
 
 /// See [`PreparedRay::unscaled`].
@@ -203,11 +259,14 @@ fn scale_ray(ray: &Ray, largest: f32, scaled: &mut Ray) -> (f32, f32) {
 }
 
 /// The axes of the shear by the axis of the largest direction component, and whether it is negative.
-static SHEAR_AXES: [[usize; 3]; 6] = [
+static SHEAR_AXES: [[usize; 3]; 8] = [
     [1, 2, 0],
     [2, 1, 0],
     [2, 0, 1],
     [0, 2, 1],
+    [0, 1, 2],
+    [1, 0, 2],
+    // As many as three bits tell apart.
     [0, 1, 2],
     [1, 0, 2],
 ];

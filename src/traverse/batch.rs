@@ -3,21 +3,22 @@
 use super::{
     bundle,
     classes::{self, Patience},
+    feed::{self, Feed},
     query::{AnyHit, ClosestHit, Query},
     wave::{self, Lane},
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Storage, TriangleLeaves, WideNode},
+    layout::{Bvh, Child, Storage, TriangleLeaves, WideNode},
     simd::{Operation, Simd},
 };
 use core::{fmt, mem::MaybeUninit};
 
 /// Rays under way at a time where the memory is ours to choose.
-const LANES: usize = 32;
+const LANES: usize = 48;
 
 /// As many rays are sorted out before those left over are interleaved.
-const WINDOW: usize = wave::GROUPS * bundle::RAYS;
+const WINDOW: usize = feed::GROUPS * bundle::RAYS;
 
 /// What `LANES` rays under way at a time are kept in, for batches on small stacks; 1 to 64 of them, some 2.3 KiB each.
 ///
@@ -50,21 +51,23 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
 /// the tree side by side; others are interleaved. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes 150 KiB of stack.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.backend().run(Batch::<N, L, S, ClosestHit> {
             bvh: self,
             rays,
             answers: hits,
+            one: Self::closest_hit,
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 150 KiB of stack.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
             rays,
             answers: occluded,
+            one: Self::any_hit,
         });
     }
 
@@ -81,6 +84,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             rays,
             answers: hits,
             scratch,
+            one: Self::closest_hit,
         });
     }
 
@@ -96,6 +100,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             rays,
             answers: occluded,
             scratch,
+            one: Self::any_hit,
         });
     }
 }
@@ -168,6 +173,8 @@ struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
     bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
+    /// What answers one that is out of the ordinary.
+    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'_, N, L, S, Q> {
@@ -177,10 +184,14 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
     fn run<T: Simd>(self, token: T) {
         let bvh = self.bvh;
         let (rays, answers) = paired(self.rays, self.answers);
+        if self.bvh.root() == Child::EMPTY {
+            answers.fill(Q::MISS);
+            return;
+        }
         let Scratch(mut lanes) = Scratch::<LANES>::new();
         let mut patience = Patience::default();
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
-            let mut waiting = [0; wave::GROUPS];
+            let mut waiting = [0; feed::GROUPS];
             let groups = rays
                 .chunks(bundle::RAYS)
                 .zip(answers.chunks_mut(bundle::RAYS));
@@ -188,7 +199,8 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            wave::trace::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
+            let mut feed = Feed::<N, L, S, Q>::new(bvh, rays, answers, &waiting, self.one);
+            wave::trace(token, bvh, &mut feed, &mut lanes);
         }
     }
 }
@@ -199,6 +211,7 @@ struct Wave<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANE
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     scratch: &'a mut Scratch<LANES>,
+    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> Operation
@@ -209,9 +222,14 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> O
     #[inline(always)]
     fn run<T: Simd>(self, token: T) {
         let (rays, answers) = paired(self.rays, self.answers);
+        if self.bvh.root() == Child::EMPTY {
+            answers.fill(Q::MISS);
+            return;
+        }
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
-            let (all, lanes) = ([u64::MAX; wave::GROUPS], &mut self.scratch.0);
-            wave::trace::<T, N, L, S, Q, LANES>(token, self.bvh, rays, answers, &all, lanes);
+            let all = [u64::MAX; feed::GROUPS];
+            let mut feed = Feed::<N, L, S, Q>::new(self.bvh, rays, answers, &all, self.one);
+            wave::trace(token, self.bvh, &mut feed, &mut self.scratch.0);
         }
     }
 }

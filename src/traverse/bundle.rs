@@ -12,7 +12,7 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Along, RayShear, Sheared, bits},
-    simd::{Lanes, Simd, Vector, splat3},
+    simd::{Lanes, Simd, Vector, load_all, splat3},
     slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocal},
 };
 use core::mem::MaybeUninit;
@@ -331,7 +331,7 @@ impl<T: Simd> Packet<T> {
                 &padded
             }
         };
-        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.columns(rows);
+        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(load_all(token, rows));
         let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         if !like.is_like(token, origin, direction, [t_min, t_max]) {
             return None;

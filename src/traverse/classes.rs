@@ -10,7 +10,7 @@ use super::{
 use crate::{
     geometry::Ray,
     layout::{Bvh, Storage, TriangleLeaves, WideNode},
-    simd::{Lanes, Simd, Vector},
+    simd::{Lanes, Simd, Vector, load_all},
     slab::PreparedRay,
 };
 
@@ -146,7 +146,7 @@ impl Classes {
             for (row, ray) in rows.iter_mut().zip(rays) {
                 *row = bytemuck::cast(*ray);
             }
-            let [_, _, _, x, y, z, ..] = token.columns(&rows);
+            let [_, _, _, x, y, z, ..] = token.transpose(load_all(token, &rows));
             let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
             let largest = [ay.le(ax) & az.le(ax), ax.lt(ay) & az.le(ay)];
             let of_eight = [

@@ -11,18 +11,15 @@
 //! tracing" (2001). Children written by a permutation: Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray
 //! tracing kernels for modern CPU architectures" (2015).
 
-use super::{query::Query, triangles::Found};
+use super::{feed::Feed, query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
+    layout::{Bvh, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Corners, Edges, RayShear},
     simd::{Lanes, Simd},
-    slab::{NarrowSlabs, PreparedRay, SceneExtent},
+    slab::NarrowRay,
 };
 use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
-
-/// The most runs of 64 rays of a wave.
-pub(super) const GROUPS: usize = 256;
 
 /// The most lanes of a wave.
 const MOST_LANES: usize = 64;
@@ -34,47 +31,28 @@ const PLACES: usize = STACK + 16;
 const BOTTOM: Link = Link::from_bits(u32::MAX);
 
 /// A ray under way.
+#[repr(C, align(64))]
 pub(super) struct Lane {
+    narrow: NarrowRay,
     current: Link,
     /// The place of the stack's last entry.
-    top: usize,
+    top: u32,
     /// Up to which `t` boxes are of interest: `t_max` and the margin.
     far: f32,
     /// Up to which `t` triangles are.
     t_max: f32,
-    slabs: NarrowSlabs,
-    /// As it was prepared.
+    links: [MaybeUninit<Link>; PLACES],
+    nears: [MaybeUninit<f32>; PLACES],
     ray: Ray,
-    axes: &'static [usize; 3],
-    /// Of the direction's component along the last of them.
-    reciprocal: f32,
-    unscale: f32,
     found: Option<Found>,
     /// The caller's number of it.
     index: usize,
-    links: [MaybeUninit<Link>; PLACES],
-    nears: [MaybeUninit<f32>; PLACES],
-}
-
-/// Rays to be traced, and those that are.
-struct Wave<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> {
-    bvh: &'a Bvh<N, L, S>,
-    scene: SceneExtent,
-    rays: &'a [Ray],
-    answers: &'a mut [Q::Answer],
-    /// For each run of 64 rays a bit for each to be traced.
-    waiting: &'a [u64; GROUPS],
-    /// The run that is being started, and those of it that are left.
-    group: usize,
-    left: u64,
-    lanes: &'a mut [MaybeUninit<Lane>; LANES],
 }
 
 /// What a first look at a leaf has brought.
 type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
 
-/// Traces those `rays` that `waiting` has a bit for, the first 64 in its first number and so on. There are as many as
-/// `answers`. Bits past the last ray are passed over.
+/// Traces all rays of `feed`, on `lanes`.
 #[inline(always)]
 pub(super) fn trace<
     T: Simd,
@@ -86,191 +64,114 @@ pub(super) fn trace<
 >(
     token: T,
     bvh: &Bvh<N, L, S>,
-    rays: &[Ray],
-    answers: &mut [Q::Answer],
-    waiting: &[u64; GROUPS],
+    feed: &mut Feed<N, L, S, Q>,
     lanes: &mut [MaybeUninit<Lane>; LANES],
 ) {
     const { assert!(0 < LANES && LANES <= MOST_LANES) };
-    if bvh.root() == Child::EMPTY {
-        answers.fill(Q::MISS);
-        return;
+    // Lengths apart from what they are of, and both from all else, so that they stay in registers.
+    let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
+    let (mut nodes, mut rest) = (0, 0);
+    // What comes after nodes: leaves, those of them with candidates, and ends.
+    let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
+    // Apart, so that lists are short and what they are of is together.
+    let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
+    let root = Link::new::<N>(bvh.root());
+    for (lane, state) in lanes.iter_mut().enumerate() {
+        let started = Lane::start(state, root, feed);
+        let leaf = root.is_leaf();
+        at_node.push_if(&mut nodes, lane, started & !leaf);
+        at_rest.push_if(&mut rest, lane, started & leaf);
     }
-    let mut wave = Wave::<N, L, S, Q, LANES> {
-        bvh,
-        scene: SceneExtent::new(bvh.bounds()),
-        rays,
-        answers,
-        waiting,
-        group: 0,
-        left: waiting[0],
-        lanes,
-    };
-    wave.run(token);
-}
-
-impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize>
-    Wave<'_, N, L, S, Q, LANES>
-{
-    #[inline(always)]
-    fn run<T: Simd>(&mut self, token: T) {
-        // Lengths apart from what they are of, and both from all else, so that they stay in registers.
-        let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
-        let (mut nodes, mut rest) = (0, 0);
-        // What comes after nodes: leaves, those of them with candidates, and ends.
-        let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
-        // Apart, so that lists are short and what they are of is together.
-        let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
-        for lane in 0..LANES {
-            let started = self.start(token, lane);
-            let leaf = self.bvh.root().is_leaf();
-            at_node.push_if(&mut nodes, lane, started & !leaf);
-            at_rest.push_if(&mut rest, lane, started & leaf);
-        }
-        loop {
-            // Leaves wait for company until few rays are at nodes.
-            if nodes > LANES / 4 || rest == 0 {
-                if nodes == 0 {
-                    return;
-                }
-                for place in 0..take(&mut nodes) {
-                    let (lane, bvh) = (at_node.get(place), self.bvh);
-                    let state = self.lane(lane);
-                    state.test_node::<T, N, L, S, Q>(token, bvh);
-                    let leaf = state.current.is_leaf();
-                    at_node.push_if(&mut nodes, lane, !leaf);
-                    at_rest.push_if(&mut rest, lane, leaf);
-                }
-                continue;
+    loop {
+        // Leaves wait for company until few rays are at nodes.
+        if nodes > LANES / 4 || rest == 0 {
+            if nodes == 0 {
+                return;
             }
-            let (mut leaves, mut triangles, mut ends) = (0, 0, 0);
-            for place in 0..take(&mut rest) {
-                let lane = at_rest.get(place);
-                let end = self.lane(lane).current == BOTTOM;
-                at_leaf.push_if(&mut leaves, lane, !end);
-                at_end.push_if(&mut ends, lane, end);
-            }
-            for place in 0..leaves {
-                let (lane, bvh) = (at_leaf.get(place), self.bvh);
-                // SAFETY: no more lanes are in a list than there are.
-                let look = unsafe { looks.get_unchecked_mut(triangles) };
-                let state = self.lane(lane);
-                let stays = state.look_at_leaf(token, bvh, look);
-                let leaf = state.current.is_leaf();
-                at_triangles.push_if(&mut triangles, lane, stays);
-                at_node.push_if(&mut nodes, lane, !leaf);
-                at_rest.push_if(&mut rest, lane, leaf & !stays);
-            }
-            for place in 0..triangles {
-                let (lane, bvh) = (at_triangles.get(place), self.bvh);
-                // SAFETY: written when the lane came to this place of the list.
-                let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
-                let state = self.lane(lane);
-                state.test_triangles::<T, N, L, S, Q>(token, bvh, look);
+            for place in 0..take(&mut nodes) {
+                let lane = at_node.get(place);
+                let state = in_list(lanes, lane);
+                state.test_node::<T, N, L, S, Q>(token, bvh);
                 let leaf = state.current.is_leaf();
                 at_node.push_if(&mut nodes, lane, !leaf);
                 at_rest.push_if(&mut rest, lane, leaf);
             }
-            for place in 0..ends {
-                let lane = at_end.get(place);
-                self.finish(lane);
-                let started = self.start(token, lane);
-                let leaf = self.bvh.root().is_leaf();
-                at_node.push_if(&mut nodes, lane, started & !leaf);
-                at_rest.push_if(&mut rest, lane, started & leaf);
-            }
+            continue;
         }
-    }
-
-    /// A lane that is in a list.
-    #[inline(always)]
-    fn lane(&mut self, lane: usize) -> &mut Lane {
-        // SAFETY: lists have numbers of lanes in which `start` has put a ray.
-        unsafe { self.lanes.get_unchecked_mut(lane).assume_init_mut() }
-    }
-
-    /// The number of the next ray to start.
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        while self.left == 0 {
-            self.group += 1;
-            self.left = *self.waiting.get(self.group)?;
+        let (mut leaves, mut triangles, mut ends) = (0, 0, 0);
+        for place in 0..take(&mut rest) {
+            let lane = at_rest.get(place);
+            let end = in_list(lanes, lane).current == BOTTOM;
+            at_leaf.push_if(&mut leaves, lane, !end);
+            at_end.push_if(&mut ends, lane, end);
         }
-        let place = self.left.trailing_zeros() as usize;
-        self.left &= self.left - 1;
-        Some(64 * self.group + place)
-    }
-
-    /// Starts the next ray that may hit something. Whether there is one.
-    #[inline(always)]
-    fn start<T: Simd>(&mut self, token: T, lane: usize) -> bool {
-        while let Some(index) = self.next() {
-            let Some(ray) = self.rays.get(index) else {
-                return false;
-            };
-            let mut room = PreparedRay::ROOM;
-            let Some(prepared) = PreparedRay::new(ray, &mut room) else {
-                if let Some(answer) = self.answers.get_mut(index) {
-                    *answer = Q::MISS;
-                }
-                continue;
-            };
-            let root = Link::new::<N>(self.bvh.root());
+        for place in 0..leaves {
+            let lane = at_leaf.get(place);
+            // SAFETY: no more lanes are in a list than there are.
+            let look = unsafe { looks.get_unchecked_mut(triangles) };
+            let state = in_list(lanes, lane);
+            let stays = state.look_at_leaf(token, bvh, look);
+            let leaf = state.current.is_leaf();
+            at_triangles.push_if(&mut triangles, lane, stays);
+            at_node.push_if(&mut nodes, lane, !leaf);
+            at_rest.push_if(&mut rest, lane, leaf & !stays);
+        }
+        for place in 0..triangles {
+            let lane = at_triangles.get(place);
+            // SAFETY: written when the lane came to this place of the list.
+            let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
+            let state = in_list(lanes, lane);
+            state.test_triangles::<T, N, L, S, Q>(token, bvh, look);
+            let leaf = state.current.is_leaf();
+            at_node.push_if(&mut nodes, lane, !leaf);
+            at_rest.push_if(&mut rest, lane, leaf);
+        }
+        for place in 0..ends {
+            let lane = at_end.get(place);
+            let state = in_list(lanes, lane);
+            feed.answer(state.index, state.found);
             // SAFETY: `lane` is one of them.
-            let state = unsafe { self.lanes.get_unchecked_mut(lane) };
-            Lane::start::<T, N>(token, state, root, &self.scene, &prepared, index);
-            return true;
-        }
-        false
-    }
-
-    /// Writes down a lane's answer.
-    #[inline(always)]
-    fn finish(&mut self, lane: usize) {
-        let state = self.lane(lane);
-        let (found, index, unscale) = (state.found, state.index, state.unscale);
-        if let (Some(ray), Some(answer)) = (self.rays.get(index), self.answers.get_mut(index)) {
-            *answer = match found {
-                None => Q::MISS,
-                Some(found) => Q::answer(found, ray, unscale, self.bvh.primitives()),
-            };
+            let state = unsafe { lanes.get_unchecked_mut(lane) };
+            let started = Lane::start(state, root, feed);
+            let leaf = root.is_leaf();
+            at_node.push_if(&mut nodes, lane, started & !leaf);
+            at_rest.push_if(&mut rest, lane, started & leaf);
         }
     }
 }
 
+/// A lane that is in a list.
+#[inline(always)]
+fn in_list<const LANES: usize>(lanes: &mut [MaybeUninit<Lane>; LANES], lane: usize) -> &mut Lane {
+    // SAFETY: lists have numbers of lanes in which `start` has put a ray.
+    unsafe { lanes.get_unchecked_mut(lane).assume_init_mut() }
+}
+
 impl Lane {
-    /// Puts a ray into a lane. Its stacks stay as they are but for the bottom.
+    /// Puts the next ray into a lane. Whether there is one. Stacks stay as they are but for the bottom.
     #[inline(always)]
-    fn start<T: Simd, N: WideNode>(
-        token: T,
+    fn start<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         lane: &mut MaybeUninit<Self>,
         root: Link,
-        scene: &SceneExtent,
-        prepared: &PreparedRay,
-        index: usize,
-    ) {
-        let reciprocal = prepared.reciprocal::<T::F32x4>(token);
-        let (slabs, open) = NarrowSlabs::new(token, prepared.ray, reciprocal, scene, N::WIDTH);
+        feed: &mut Feed<N, L, S, Q>,
+    ) -> bool {
+        let Some((index, ray, narrow)) = feed.next() else {
+            return false;
+        };
         let lane = lane.as_mut_ptr();
-        // SAFETY: fields of memory that is there; the stacks need not be written.
+        // SAFETY: fields of memory that is there; no more of the stacks is read than was written.
         unsafe {
+            (&raw mut (*lane).narrow).write(*narrow);
             (&raw mut (*lane).current).write(root);
             (&raw mut (*lane).top).write(0);
-            (&raw mut (*lane).far).write(prepared.ray.t_max + slabs.margin());
-            (&raw mut (*lane).t_max).write(prepared.ray.t_max);
-            (&raw mut (*lane).slabs).write(slabs);
-            if open {
-                (*lane).slabs.open();
-            }
-            (&raw mut (*lane).ray).write(*prepared.ray);
-            (&raw mut (*lane).axes).write(prepared.axes);
-            let z = prepared.axes[2] % 4;
-            (&raw mut (*lane).reciprocal).write(reciprocal.to_array()[z]);
-            (&raw mut (*lane).unscale).write(prepared.unscale());
+            (&raw mut (*lane).far).write(ray.t_max + narrow.margin());
+            (&raw mut (*lane).t_max).write(ray.t_max);
+            (&raw mut (*lane).links[0]).write(MaybeUninit::new(BOTTOM));
+            (&raw mut (*lane).ray).write(*ray);
             (&raw mut (*lane).found).write(None);
             (&raw mut (*lane).index).write(index);
-            (&raw mut (*lane).links[0]).write(MaybeUninit::new(BOTTOM));
         }
+        true
     }
 
     /// Tests the node's boxes, and goes on to the nearest child or else to the stack's last entry.
@@ -283,13 +184,13 @@ impl Lane {
         let nodes = bvh.nodes().as_ptr();
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { &*nodes.byte_add(self.current.node_offset()) };
-        let slabs = N::widen(token, &self.slabs);
+        let slabs = N::widen(token, &self.narrow);
         let far = N::Lanes::<T>::splat(token, self.far);
         let (hit, near) = node.test(token, &slabs, far);
         let mask = hit.bits();
         let links = node.link_lanes(token);
         // Read once: it might be in what is written below, for all that the compiler sees.
-        let top = self.top;
+        let top = self.top as usize;
         let above = top + 1;
         // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children behind, which `top` is at
         // most, and a vector's worth of places is above them. `top` and those below were written. `child` is a lane.
@@ -310,7 +211,7 @@ impl Lane {
             let child = node.link(child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
-        self.top = (top + mask.count_ones() as usize).wrapping_sub(1);
+        self.top = (top as u32 + mask.count_ones()).wrapping_sub(1);
 
         // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
         // 32 bits hold.
@@ -331,9 +232,9 @@ impl Lane {
         let (_, edges) = look.write(self.leaf(bvh).edges(token, &self.shear(token)));
         let stays = edges.candidates != 0;
         // SAFETY: `top` and those below were written.
-        let last = unsafe { self.links.get_unchecked(self.top).assume_init() };
+        let last = unsafe { self.links.get_unchecked(self.top as usize).assume_init() };
         self.current = select_unpredictable(stays, self.current, last);
-        self.top = self.top.wrapping_sub(usize::from(!stays));
+        self.top = self.top.wrapping_sub(u32::from(!stays));
         stays
     }
 
@@ -353,7 +254,7 @@ impl Lane {
                 let (leaf, primitives) = (self.leaf(bvh), bvh.primitives());
                 let best = &mut self.found;
                 if Found::choose::<T>(best, &mut self.t_max, leaf, hits, primitives) {
-                    self.far = self.t_max + self.slabs.margin();
+                    self.far = self.t_max + self.narrow.margin();
                     self.forget_the_far();
                 }
             }
@@ -366,7 +267,7 @@ impl Lane {
             return;
         }
         // SAFETY: `top` and those below were written.
-        self.current = unsafe { self.links.get_unchecked(self.top).assume_init() };
+        self.current = unsafe { self.links.get_unchecked(self.top as usize).assume_init() };
         self.top = self.top.wrapping_sub(1);
     }
 
@@ -374,7 +275,7 @@ impl Lane {
     #[inline(always)]
     fn forget_the_far(&mut self) {
         let mut kept = 0;
-        for place in 1..=self.top {
+        for place in 1..=self.top as usize {
             // SAFETY: `top` and those below were written; `kept + 1` is at most `place`.
             unsafe {
                 let near = self.nears.get_unchecked(place).assume_init();
@@ -383,7 +284,7 @@ impl Lane {
                 kept += usize::from(near <= self.far);
             }
         }
-        self.top = kept;
+        self.top = kept as u32;
     }
 
     #[inline(always)]
@@ -397,8 +298,8 @@ impl Lane {
 
     #[inline(always)]
     fn shear<T: Simd>(&self, token: T) -> RayShear<'_, T::F32x8> {
-        let reciprocal = T::F32x8::splat(token, self.reciprocal);
-        RayShear::of(&self.ray, self.axes, reciprocal)
+        let reciprocal = T::F32x8::splat(token, self.narrow.along());
+        RayShear::of(&self.ray, self.narrow.axes(), reciprocal)
     }
 }
 
