@@ -5,7 +5,7 @@ use super::{
     bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
 };
 use crate::{
-    primitive::triangle::{Corners, RayShear},
+    primitive::triangle::{Corners, Exact, RayShear},
     simd::{Simd, Vector},
 };
 use bytemuck::{Pod, Zeroable};
@@ -107,6 +107,8 @@ impl TriangleLeaf {
 }
 
 impl Triangles for &TriangleLeaf {
+    type Precision = Exact;
+
     #[inline(always)]
     fn shared<'a>(self) -> Option<&'a TriangleLeaf>
     where

@@ -2,7 +2,7 @@
 
 use super::{Borrowed, LayoutError, Leaf, Storage, TriangleLeaf};
 use crate::{
-    primitive::triangle::{Corners, Edges, RayShear, TriangleHits},
+    primitive::triangle::{Along, Corners, Edges, Precision, RayShear, TriangleHits},
     simd::{Lanes, Simd},
 };
 use core::ops::Range;
@@ -107,6 +107,9 @@ impl<L: Leaf> Leaves for L {
 /// Up to 8 triangles: what the one triangle test needs of a leaf.
 #[doc(hidden)]
 pub trait Triangles: Copy {
+    /// How they are tested.
+    type Precision: Precision;
+
     /// Where their numbers begin in the hierarchy's list.
     fn first(self) -> usize;
     /// How many there are.
@@ -156,8 +159,19 @@ pub trait Triangles: Copy {
             return None;
         }
         let t_max = T::F32x8::splat(token, t_max);
-        ray.along(token)
-            .test::<8, NEED_T>(token, corners, edges, t_max)
+        Self::hits::<T, NEED_T>(token, &ray.along(token), corners, edges, t_max)
+    }
+
+    /// The rest of the test, which may as well be of rays and one triangle.
+    #[inline(always)]
+    fn hits<T: Simd, const NEED_T: bool>(
+        token: T,
+        along: &Along<T::F32x8>,
+        corners: Corners<T::F32x8>,
+        edges: Edges<T::F32x8>,
+        t_max: T::F32x8,
+    ) -> Option<TriangleHits<T::F32x8>> {
+        along.test::<8, NEED_T, Self::Precision>(token, corners, edges, t_max)
     }
 }
 

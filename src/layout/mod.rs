@@ -1,5 +1,6 @@
 //! How a hierarchy lies in memory: nodes, leaves, and the check that makes them safe to walk.
 
+mod approximate;
 mod bvh;
 pub mod bytes;
 mod check;
@@ -13,6 +14,7 @@ mod run;
 mod storage;
 
 #[cfg(feature = "std")]
+pub use approximate::Approximate;
 pub(crate) use bvh::tested_bounds;
 pub use bvh::{
     Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, PrimitiveBvh4Ref,

@@ -3,7 +3,7 @@
 use super::{Borrowed, Bvh, LayoutError, Leaves, Storage, Triangles, WideNode};
 use crate::{
     geometry::TriangleMesh,
-    primitive::triangle::{Corners, RayShear},
+    primitive::triangle::{Corners, Exact, RayShear},
     simd::{Lanes, RUN_FIRST_BITS, Simd, packed_run},
 };
 use core::{error::Error, fmt, ops::Range};
@@ -104,6 +104,8 @@ impl<M> Run<'_, M> {
 }
 
 impl Triangles for Run<'_, TriangleMesh<'_>> {
+    type Precision = Exact;
+
     #[inline(always)]
     fn first(self) -> usize {
         self.range().start

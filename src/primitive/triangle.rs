@@ -20,6 +20,30 @@ use crate::{
     slab::{CONDITION, PreparedRay, UNIT_ROUNDOFF, pow2},
 };
 
+/// How much of the triangle test is done.
+#[doc(hidden)]
+pub trait Precision {
+    /// Whether what `f32` leaves open is worked out in `f64`. If not, a triangle that the ray passes through an edge of,
+    /// as rounded, is hit, and its weights and `t` are those of `f32`.
+    const EXACT: bool;
+}
+
+/// All of it.
+#[derive(Clone, Copy, Debug)]
+pub enum Exact {}
+
+/// What there is to do in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub enum InFloats {}
+
+impl Precision for Exact {
+    const EXACT: bool = true;
+}
+
+impl Precision for InFloats {
+    const EXACT: bool = false;
+}
+
 /// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
 /// no more than to load a vector, and many rays never get to a leaf.
 #[derive(Clone, Copy)]
@@ -182,7 +206,11 @@ impl RayShear<'_, F32x1> {
     ///
     /// A call, for there to be one of it.
     #[inline(never)]
-    pub(crate) fn test_triangle(&self, corners: &[[f32; 3]; 3], t_max: f32) -> Option<[f32; 3]> {
+    pub(crate) fn test_triangle<P: Precision>(
+        &self,
+        corners: &[[f32; 3]; 3],
+        t_max: f32,
+    ) -> Option<[f32; 3]> {
         let token = Portable;
         let [a, b, c] = corners;
         let (a, b, c) = (
@@ -196,7 +224,7 @@ impl RayShear<'_, F32x1> {
         if edges.candidates == 0 {
             return None;
         }
-        let hit = along.test::<1, true>(token, corners, edges, F32x1(t_max))?;
+        let hit = along.test::<1, true, P>(token, corners, edges, F32x1(t_max))?;
         Some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
@@ -239,7 +267,7 @@ impl<V> Along<V> {
     /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`. If `NEED_T` is not
     /// set, it is enough to know whether there are any.
     #[inline(always)]
-    pub(crate) fn test<const N: usize, const NEED_T: bool>(
+    pub(crate) fn test<const N: usize, const NEED_T: bool, P: Precision>(
         &self,
         token: V::Token,
         corners: Corners<V>,
@@ -263,6 +291,12 @@ impl<V> Along<V> {
         let zero = V::splat(token, 0.0);
         let reciprocal = self.reciprocal;
         let (ab, ac) = (bz - az, cz - az);
+        if !P::EXACT {
+            let inside = (zero.le(least) | most.le(zero)) & finite & zero.lt(size);
+            let (u, v) = (wb / determinant, wc / determinant);
+            let t = (az + u * ab + v * ac) * reciprocal + zero;
+            return self.within_range(token, candidates & inside.bits(), [t, u, v], t_max);
+        }
         let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
         let extent_y = ay.abs().max(by.abs()).max(cy.abs());
         let depth = ab.abs().max(ac.abs());
@@ -302,8 +336,24 @@ impl<V> Along<V> {
             t = (az + u * ab + v * ac) * reciprocal + zero;
         }
 
-        let in_range = t_min.le(t) & t.le(t_max) & t.abs().lt(infinity);
-        mask &= in_range.bits();
+        self.within_range(token, mask, [t, u, v], t_max)
+    }
+
+    /// The hits, of those that `mask` has a bit for, with a `t` in the ray's range up to `t_max`.
+    #[inline(always)]
+    fn within_range<const N: usize>(
+        &self,
+        token: V::Token,
+        mask: u32,
+        [t, u, v]: [V; 3],
+        t_max: V,
+    ) -> Option<TriangleHits<V>>
+    where
+        V: Vector<N>,
+    {
+        let (zero, infinity) = (V::splat(token, 0.0), V::splat(token, f32::INFINITY));
+        let in_range = self.t_min.le(t) & t.le(t_max) & t.abs().lt(infinity);
+        let mask = mask & in_range.bits();
         (mask != 0).then_some(TriangleHits {
             mask,
             t,

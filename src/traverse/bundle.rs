@@ -299,7 +299,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             let new = if lanes.count_ones() <= FEW {
                 packet.test_by_ray::<Q>(token, leaf, primitives, lanes, found, of_packet, axes)
             } else {
-                packet.test_leaf::<Q>(token, leaf, primitives, lanes, found, axes)
+                packet.test_leaf::<Q, _>(token, leaf, primitives, lanes, found, axes)
             };
             packet.far = packet.t_max + packet.slabs.margins();
             closer |= u64::from(new) << (LANES * index);
@@ -367,10 +367,10 @@ impl<T: Simd> Packet<T> {
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
     #[inline(always)]
-    fn test_leaf<Q: Query>(
+    fn test_leaf<Q: Query, R: Triangles>(
         &mut self,
         token: T,
-        leaf: impl Triangles,
+        leaf: R,
         primitives: &[u32],
         mut lanes: u32,
         mut found: u32,
@@ -415,9 +415,7 @@ impl<T: Simd> Packet<T> {
             if edges.candidates == 0 {
                 continue;
             }
-            let hits = self
-                .along
-                .test::<LANES, true>(token, corners, edges, self.t_max);
+            let hits = R::hits::<T, true>(token, &self.along, corners, edges, self.t_max);
             let Some(hits) = hits else {
                 continue;
             };

@@ -56,7 +56,9 @@ impl<L: TriangleLeaves> Visitor<L> for Finder<'_> {
     #[inline(always)]
     fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32> {
         for lane in 0..leaf.count() {
-            let hit = self.shear.test_triangle(&leaf.triangle(lane), self.t_max);
+            let triangle = leaf.triangle(lane);
+            let hit = (self.shear)
+                .test_triangle::<<L::Ref<'_> as Triangles>::Precision>(&triangle, self.t_max);
             if let Some([t, u, v]) = hit {
                 let place = leaf.first() + lane;
                 let found = Found { t, u, v, place };

@@ -249,7 +249,7 @@ impl Lane {
         let t_max = T::F32x8::splat(token, self.t_max);
         let along = self.shear(token).along(token);
         if Q::CLOSEST {
-            let hits = along.test::<8, true>(token, corners, edges, t_max);
+            let hits = L::Ref::hits::<T, true>(token, &along, corners, edges, t_max);
             if let Some(hits) = hits {
                 let (leaf, primitives) = (self.leaf(bvh), bvh.primitives());
                 let best = &mut self.found;
@@ -258,10 +258,7 @@ impl Lane {
                     self.forget_the_far();
                 }
             }
-        } else if along
-            .test::<8, false>(token, corners, edges, t_max)
-            .is_some()
-        {
+        } else if L::Ref::hits::<T, false>(token, &along, corners, edges, t_max).is_some() {
             self.found = Some(Found::default());
             self.current = BOTTOM;
             return;

@@ -1,4 +1,5 @@
-//! This crate: each width on each of the processor's backends. A width is built once; its backends
+//! This crate: each width on each of the processor's backends, a ray a call or all at once; on the
+//! best one also eight a call, and approximately. A width is built once; its backends
 //! trace the same tree in the same memory.
 
 use super::{Batch, Built, Chosen, Engine, Takes, timed};
@@ -65,6 +66,14 @@ fn of_width<N: WideNode + Send + 'static>(
             backend,
             WideBvh::<N, AllAtOnce>::boxed,
         ));
+        if N::WIDTH == 8 && backend == Backend::detect() {
+            let make = WideBvh::<N, InPackets>::boxed;
+            kinds.push((format!("{name} packet 8"), backend, make));
+            let make = WideBvh::<N, Approximately<OneByOne>>::boxed;
+            kinds.push((format!("{name} approximate"), backend, make));
+            let make = WideBvh::<N, Approximately<AllAtOnce>>::boxed;
+            kinds.push((format!("{name} approximate batch"), backend, make));
+        }
     }
     kinds.retain(|(name, ..)| chosen(name));
     if kinds.is_empty() {
@@ -100,6 +109,8 @@ pub(super) fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
 /// How rays are handed over.
 pub(super) trait Call {
     const TAKES: Takes;
+    /// Whether answers are the reference's.
+    const EXACT: bool = true;
 
     fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
         bvh: &Bvh<N, L, S>,
@@ -164,6 +175,73 @@ impl Call for AllAtOnce {
     }
 }
 
+/// Eight at a time.
+struct InPackets;
+
+impl InPackets {
+    const RAYS: usize = 8;
+
+    /// Every eight rays and a bit for each; the last ones may be fewer.
+    fn packets(rays: &[Ray]) -> impl Iterator<Item = ([Ray; Self::RAYS], u64)> {
+        rays.chunks(Self::RAYS).map(|rays| {
+            let mut packet = [rays[0]; Self::RAYS];
+            packet[..rays.len()].copy_from_slice(rays);
+            (packet, (1 << rays.len()) - 1)
+        })
+    }
+}
+
+impl Call for InPackets {
+    const TAKES: Takes = Takes::Batches;
+
+    fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) {
+        for ((packet, active), hits) in Self::packets(rays).zip(hits.chunks_mut(Self::RAYS)) {
+            let found = bvh.closest_hit_packet(&packet, active);
+            hits.copy_from_slice(&found[..hits.len()]);
+        }
+    }
+
+    fn any<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    ) {
+        for ((packet, active), occluded) in Self::packets(rays).zip(occluded.chunks_mut(Self::RAYS))
+        {
+            let found = bvh.any_hit_packet(&packet, active);
+            occluded.copy_from_slice(&found[..occluded.len()]);
+        }
+    }
+}
+
+/// In another way, with the triangle test in `f32` alone.
+struct Approximately<C>(PhantomData<C>);
+
+impl<C: Call> Call for Approximately<C> {
+    const TAKES: Takes = C::TAKES;
+    const EXACT: bool = false;
+
+    fn closest<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) {
+        C::closest(&bvh.approximate(), rays, hits);
+    }
+
+    fn any<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        rays: &[Ray],
+        occluded: &mut [bool],
+    ) {
+        C::any(&bvh.approximate(), rays, occluded);
+    }
+}
+
 /// Makes an engine of the tree, with the name and the backend.
 type Make<N> = fn(String, Built, Shared<N>, Backend) -> Box<dyn Engine>;
 
@@ -198,7 +276,7 @@ impl<N: WideNode, C: Call> Engine for WideBvh<N, C> {
     }
 
     fn is_exact(&self) -> bool {
-        true
+        C::EXACT
     }
 
     fn takes(&self) -> Takes {

@@ -37,7 +37,8 @@ use wide_bvh_scenes::Mesh;
 /// that walk this crate's tree and differ in their box test or their triangle test alone.
 ///
 /// Rays: the race's closest-hit workloads; rays aimed at vertices, at edges, at silhouettes, and from the
-/// surface at either; and rays from inside closed meshes made by code, at their corners, edges and faces.
+/// surface at either; rays from inside closed meshes made by code, at their corners, edges and faces; and rays at a
+/// ball of needles.
 ///
 /// Truth is exact arithmetic on the floats given. A ray that no float test can decide, because it passes an
 /// outline within the rounding of a triangle to the ray, is counted apart; the tables' legend tells how.
@@ -102,6 +103,9 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         let sets = |_: &Bvh8| vec![rays::from_inside(scene, *depths, effort.rays)];
         results.add_scene(scene, sets, args, &effort)?;
     }
+    let needles = rays::needles();
+    let sets = |_: &Bvh8| vec![rays::at_faces(&needles, effort.rays)];
+    results.add_scene(&needles, sets, args, &effort)?;
     let Tables {
         records,
         sets,

@@ -27,6 +27,9 @@ pub const SURFACE: &str = "from surface";
 /// From inside a closed mesh at its corners, edges and faces.
 pub const INSIDE: &str = "from inside";
 
+/// At needles.
+pub const NEEDLES: &str = "needles";
+
 /// The rays of one scene, about `size` of each kind. `bvh` is of the same mesh.
 pub fn of_scene<'a>(mesh: &'a Mesh, bvh: &'a Bvh8, size: usize) -> Vec<RaySet> {
     let of_race = workloads::workloads(mesh, bvh, size);
@@ -75,6 +78,50 @@ pub fn closed_meshes() -> [(Mesh, [f32; 2]); 3] {
             [3.0, 40.0],
         ),
     ]
+}
+
+/// Needles across one another in a ball, as hair is made of: about as long as the ball is wide, 10^-5 to 10^-3 of that
+/// across.
+pub fn needles() -> Mesh {
+    let mut rng = Rng::with_seed(3);
+    let mut point = || loop {
+        let point = Vec3::from([(); 3].map(|()| 2.0 * rng.f32() - 1.0));
+        if point.length() < 1.0 {
+            break point;
+        }
+    };
+    let mut positions = Vec::new();
+    for needle in 0..3000 {
+        let (a, b) = (point(), point());
+        let width = 10f32.powf(-3.0 - (needle % 3) as f32);
+        let c = b + point().normalize() * width * a.distance(b);
+        positions.extend([a, b, c].map(|corner| corner.to_array()));
+    }
+    let count = positions.len() as u32;
+    Mesh {
+        name: NEEDLES.to_owned(),
+        positions,
+        indices: (0..count).step_by(3).map(|i| [i, i + 1, i + 2]).collect(),
+    }
+}
+
+/// Rays at points of triangles, from as far away as the mesh is wide.
+pub fn at_faces(mesh: &Mesh, size: usize) -> RaySet {
+    let mut rng = Rng::with_seed(4);
+    let (min, max) = mesh.bounds();
+    let (min, max) = (Vec3::from(min), Vec3::from(max));
+    let mut ray = || {
+        let [a, b, c] = corners(mesh, rng.usize(..mesh.indices.len()));
+        let (s, t) = (rng.f32(), rng.f32());
+        let target = a.lerp(b.lerp(c, s), t.sqrt());
+        let away = Vec3::from([(); 3].map(|()| rng.f32() - 0.5)).normalize_or(Vec3::X);
+        let origin = (min + max) * 0.5 + away * min.distance(max);
+        Ray::new(origin, target - origin)
+    };
+    RaySet {
+        name: NEEDLES,
+        rays: (0..size).map(|_| ray()).collect(),
+    }
 }
 
 /// Rays from inside a closed mesh: from `depths` below a face's middle, a third of them from whole numbers, at corners,

@@ -1,0 +1,125 @@
+//! The same leaves, their triangles tested in `f32` alone.
+
+use super::{
+    Borrowed, Bvh, LayoutError, Leaves, Storage, TriangleLeaf, TriangleLeaves, Triangles, WideNode,
+};
+use crate::{
+    primitive::triangle::{Corners, InFloats, RayShear},
+    simd::Simd,
+};
+use core::{marker::PhantomData, ops::Range};
+
+/// Leaves `L`, with a triangle test that leaves out what makes it exact: see [`Bvh::approximate`].
+#[derive(Clone, Copy, Debug)]
+pub struct Approximate<L>(PhantomData<L>);
+
+/// One of them.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub struct ApproximateRef<R>(R);
+
+impl<L: TriangleLeaves> Leaves for Approximate<L> {
+    type Store<S: Storage> = L::Store<S>;
+    type Ref<'a> = ApproximateRef<L::Ref<'a>>;
+
+    #[inline(always)]
+    fn span(place: usize) -> Range<usize> {
+        L::span(place)
+    }
+
+    fn only(count: usize) -> Option<u32> {
+        L::only(count)
+    }
+
+    fn count<S: Storage>(store: &L::Store<S>, primitives: &[u32]) -> Result<usize, LayoutError> {
+        L::count::<S>(store, primitives)
+    }
+
+    fn numbers(primitives: &[u32]) -> u64 {
+        L::numbers(primitives)
+    }
+
+    fn borrowed<S: Storage>(store: &L::Store<S>) -> L::Store<Borrowed<'_>> {
+        L::borrowed::<S>(store)
+    }
+
+    fn bytes<S: Storage>(store: &L::Store<S>) -> usize {
+        L::bytes::<S>(store)
+    }
+
+    #[inline(always)]
+    unsafe fn at<'a, S: Storage>(
+        store: &'a L::Store<S>,
+        primitives: &'a [u32],
+        place: usize,
+    ) -> Self::Ref<'a> {
+        // SAFETY: the caller's promise.
+        ApproximateRef(unsafe { L::at::<S>(store, primitives, place) })
+    }
+
+    #[inline(always)]
+    fn address<S: Storage>(store: &L::Store<S>, primitives: &[u32], place: usize) -> *const u8 {
+        L::address::<S>(store, primitives, place)
+    }
+
+    #[inline(always)]
+    fn primitives(ApproximateRef(leaf): Self::Ref<'_>) -> usize {
+        L::primitives(leaf)
+    }
+}
+
+impl<R: Triangles> Triangles for ApproximateRef<R> {
+    type Precision = InFloats;
+
+    #[inline(always)]
+    fn first(self) -> usize {
+        self.0.first()
+    }
+
+    #[inline(always)]
+    fn count(self) -> usize {
+        self.0.count()
+    }
+
+    #[inline(always)]
+    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
+        self.0.corners(token, ray)
+    }
+
+    #[inline(always)]
+    fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
+        self.0.triangle(lane)
+    }
+
+    #[inline(always)]
+    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
+    where
+        Self: 'a,
+    {
+        self.0.shared()
+    }
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
+    /// The same hierarchy, borrowed, with a triangle test in `f32` alone: Woop's, without what makes it exact. One ray a
+    /// call is 3 to 5 % faster, a batch of scattered rays 8 %.
+    ///
+    /// Answers are no longer brute force's. A ray that meets an edge or a vertex, as rounded, hits all triangles there. On
+    /// needles, and on triangles seen nearly edge-on, `u`, `v` and `t` are as far off as `f32` has them, and with them
+    /// which of two triangles is first: over needles 10^-3 to 10^-5 as wide as long, one ray in a thousand has `t` off by
+    /// more than 3·10^-3 of itself, where the exact test has 3·10^-6, and a few in a thousand hit what they pass.
+    /// Still, no ray slips through a closed mesh, whose size is between 10^-15 and 10^15.
+    ///
+    /// ```
+    /// # use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}};
+    /// # let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2_u32]])?;
+    /// let bvh = Builder::new().build(&mesh)?;
+    /// let preview = bvh.approximate();
+    /// assert!(preview.any_hit(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn approximate(&self) -> Bvh<N, Approximate<L>, Borrowed<'_>> {
+        self.with_leaves(L::borrowed::<S>(self.leaf_store()))
+    }
+}
