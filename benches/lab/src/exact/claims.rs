@@ -100,7 +100,7 @@ pub fn check(ray: &Ray, corners: [Vec3; 3]) -> Result<Option<Hit>, String> {
         claims.t(hit, weights, defined.as_ref())?;
         claims.uv(hit, weights)?;
         claims.least_box(hit, weights)?;
-        claims.boxes_beside(weights)?;
+        claims.box_beside(hit, weights)?;
     }
     claims.own_box()?;
     Ok(hit)
@@ -304,9 +304,9 @@ impl Claims<'_> {
             })
     }
 
-    /// Claim 8, for the boxes of one point that are met as late as they may be along one axis, and left as early along
-    /// the other.
-    fn boxes_beside(&self, weights: &[Number; 3]) -> Result<(), String> {
+    /// Claim 8, for a box of one point that is met as late as it may be along one axis, and left as early along the
+    /// other; which, and how t is bounded, is as the hit's last bits have it.
+    fn box_beside(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
         let (scene, origin) = (Aabb::from_points(self.corners), self.ray.origin);
         let extent = (scene.min.abs().max(scene.max.abs()) + origin.abs()).max_element();
         let scaled = self.sheared.scale != 1.0;
@@ -316,36 +316,37 @@ impl Claims<'_> {
         let t_star = self.t_star(weights);
         let extent = exact(extent.next_down());
         let beside = exact(K_SHEAR) * exact(U) * &extent;
-        let early = exact(K_T_USED) * exact(U) * &extent / self.length();
-        let ([(t_min, _), (_, t_max)], infinity) = (
-            [&t_star + &early, &t_star - &early].map(|t| between_floats(&t)),
-            f32::INFINITY,
-        );
+        let choice = (hit.t.to_bits() ^ hit.u.to_bits()) as usize;
         let [x, y, z] = self.sheared.axes;
-        for [late, soon] in [[x, y], [y, x]] {
-            let mut at = Vec3::ZERO;
-            for (axis, sign) in [(late, 1.0), (soon, -1.0), (z, 0.0)] {
-                let place = &self.exact_origin[axis] + &self.exact_direction[axis] * &t_star;
-                let sign = sign * self.ray.direction[axis].signum();
-                let (low, high) = between_floats(&(&place + exact(sign) * &beside));
-                // The float on the ray's side.
-                at[axis] = if sign > 0.0 { low } else { high };
-                if sign != 0.0 && abs(&(exact(at[axis]) - place)) > beside {
-                    // Floats are too far apart.
-                    return Ok(());
-                }
-            }
-            let mut aabb = Aabb::new(at, at);
-            (aabb.min[z], aabb.max[z]) =
-                between_floats(&(&self.exact_origin[z] + &self.exact_direction[z] * &t_star));
-            for (t_min, t_max) in [(-infinity, infinity), (-infinity, t_max), (t_min, infinity)] {
-                self.passes(&aabb, &aabb, &self.ray.with_range(t_min, t_max))
-                    .map_err(|backend| {
-                        format!("claim 8: {at}, from {t_min} to {t_max}, is lost by {backend}")
-                    })?;
+        let [late, soon] = [[x, y], [y, x]][choice % 2];
+        let mut aabb = Aabb::EMPTY;
+        for (axis, sign) in [(late, 1.0), (soon, -1.0), (z, 0.0)] {
+            let place = &self.exact_origin[axis] + &self.exact_direction[axis] * &t_star;
+            let sign = sign * self.ray.direction[axis].signum();
+            let (low, high) = between_floats(&(&place + exact(sign) * &beside));
+            // Beside the ray, the float on its side.
+            (aabb.min[axis], aabb.max[axis]) = match sign {
+                1.0 => (low, low),
+                -1.0 => (high, high),
+                _ => (low, high),
+            };
+            if sign != 0.0 && abs(&(exact(aabb.min[axis]) - place)) > beside {
+                // Floats are too far apart.
+                return Ok(());
             }
         }
-        Ok(())
+        let early = exact(K_T_USED) * exact(U) * &extent / self.length();
+        let infinity = f32::INFINITY;
+        let (t_min, t_max) = match choice / 2 % 3 {
+            0 => (-infinity, infinity),
+            1 => (-infinity, between_floats(&(&t_star - early)).1),
+            _ => (between_floats(&(&t_star + early)).0, infinity),
+        };
+        self.passes(&aabb, &aabb, &self.ray.with_range(t_min, t_max))
+            .map_err(|backend| {
+                let Aabb { min, max } = aabb;
+                format!("claim 8: {min}, {max} from {t_min} to {t_max} is lost by {backend}")
+            })
     }
 
     /// Whether every box test passes `aabb` in a scene of this triangle and `more`; else which does not.

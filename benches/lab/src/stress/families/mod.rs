@@ -18,6 +18,8 @@ pub struct Family {
     pub about: &'static str,
     /// It needs denormals to be flushed to zero.
     pub flushes: bool,
+    /// One number in so many makes a case, where cases take much longer than others.
+    pub every: u64,
     pub case: fn(&mut Rng) -> Case,
 }
 
@@ -26,7 +28,20 @@ const fn family(name: &'static str, about: &'static str, case: fn(&mut Rng) -> C
         name,
         about,
         flushes: false,
+        every: 1,
         case,
+    }
+}
+
+/// A family of large cases, or that are searched for.
+const fn slow_family(
+    name: &'static str,
+    about: &'static str,
+    case: fn(&mut Rng) -> Case,
+) -> Family {
+    Family {
+        every: 4,
+        ..family(name, about, case)
     }
 }
 
@@ -98,13 +113,13 @@ pub const FAMILIES: &[Family] = &[
         "deep and unbalanced trees, chains of thousands",
         crowded::trees,
     ),
-    family(
+    slow_family(
         "coincident",
         "thousands of triangles in the same place",
         crowded::coincident,
     ),
     family("dust", "one giant triangle among dust", crowded::dust),
-    family(
+    slow_family(
         "pieces",
         "long triangles across one another, cut by the builder",
         crowded::pieces,
@@ -114,17 +129,17 @@ pub const FAMILIES: &[Family] = &[
         "all of it at once: scaled, moved, squashed, any direction",
         range::mixed,
     ),
-    family(
+    slow_family(
         "worst-t",
         "rays that were searched for a large error of t",
         worst::t,
     ),
-    family(
+    slow_family(
         "worst-shear",
         "rays that were searched for a large error of the shear",
         worst::shear,
     ),
-    family(
+    slow_family(
         "worst-slab",
         "rays that were searched for a large error of the box test",
         worst::slab,
