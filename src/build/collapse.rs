@@ -13,7 +13,6 @@ use super::{
     emit::Shape,
     input::{Input, leaf_of},
     monitor::{STRIDE, Watch},
-    ploc::Node,
     sweep::Leaves,
 };
 use crate::{geometry::Aabb, simd::Backend};
@@ -108,110 +107,19 @@ impl<const W: usize> Shape<W> for Collapse<'_, W> {
     }
 }
 
-impl<const W: usize> Forests for Collapse<'_, W> {
-    fn forest(&self, node: usize) -> [f32; MAX_WIDTH] {
-        self.entries[node].forest
-    }
-
-    fn below(&self, node: usize) -> [usize; 2] {
-        self.nodes[node].children()
-    }
-}
-
-/// The cheapest collapse of a tree whose leaves stay what they are.
-pub(super) struct LeafCollapse<'a, const W: usize> {
-    nodes: &'a [Node],
-    measure: Measure,
-    leaf_cost: fn(usize) -> f32,
-    /// C(n, 1) to C(n, W) of nodes that are no leaves.
-    forests: Vec<[f32; MAX_WIDTH]>,
-}
-
-impl<'a, const W: usize> LeafCollapse<'a, W> {
-    pub fn new<I: Input>(nodes: &'a [Node], watch: &Watch) -> Self {
-        let bounds = nodes.last().map_or(Aabb::EMPTY, |root| root.aabb);
-        let mut collapse = Self {
-            nodes,
-            measure: Measure::of_bounds(&bounds),
-            leaf_cost: I::leaf_cost,
-            forests: vec![[0.0; _]; nodes.len()],
-        };
-        for (index, node) in nodes.iter().enumerate() {
-            if index % STRIDE == 0 {
-                watch.advance(STRIDE);
-            }
-            if node.is_leaf() {
-                continue;
-            }
-            let [left, right] = node.children().map(|child| collapse.forest(child));
-            let mut forest = forest::<W>(&left, &right);
-            forest[0] = forest[W - 1] + collapse.measure.half_area(&node.aabb) * cost::NODE;
-            least_so_far::<W>(&mut forest);
-            collapse.forests[index] = forest;
-        }
-        collapse
-    }
-}
-
-impl<const W: usize> Forests for LeafCollapse<'_, W> {
-    #[inline(always)]
-    fn forest(&self, node: usize) -> [f32; MAX_WIDTH] {
-        let of = &self.nodes[node];
-        match of.is_leaf() {
-            true => [self.measure.half_area(&of.aabb) * (self.leaf_cost)(of.count()); _],
-            false => self.forests[node],
-        }
-    }
-
-    #[inline(always)]
-    fn below(&self, node: usize) -> [usize; 2] {
-        self.nodes[node].children()
-    }
-}
-
-impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
-    fn len(&self) -> usize {
-        self.nodes.len()
-    }
-
-    fn root(&self) -> usize {
-        self.nodes.len() - 1
-    }
-
-    fn aabb(&self, node: usize) -> &Aabb {
-        &self.nodes[node].aabb
-    }
-
-    fn is_leaf(&self, node: usize) -> bool {
-        self.nodes[node].is_leaf()
-    }
-
-    fn children(&self, node: usize) -> ([usize; W], usize) {
-        children(self, node)
-    }
-}
-
-/// What a tree's collapse is read from.
-trait Forests {
-    /// C(n, 1) to C(n, W).
-    fn forest(&self, node: usize) -> [f32; MAX_WIDTH];
-    /// The two children of a node.
-    fn below(&self, node: usize) -> [usize; 2];
-}
-
 /// The children of a node that becomes a wide one, in the binary tree's order.
 #[inline(always)]
-fn children<const W: usize>(forests: &impl Forests, node: usize) -> ([usize; W], usize) {
+fn children<const W: usize>(collapse: &Collapse<W>, node: usize) -> ([usize; W], usize) {
     let (mut children, mut count) = ([0; W], 0);
     // Forests still to be taken apart, and how many roots each may have: never more than W in all.
     let mut todo = [(0, 0); W];
-    let mut len = cut(forests, node, W, &mut todo);
+    let mut len = cut(collapse, node, W, &mut todo);
     while len > 0 {
         len -= 1;
         let (node, mut roots) = todo[len];
         if roots > 1 {
             // As few roots as do for the cost.
-            let forest = forests.forest(node);
+            let forest = &collapse.entries[node].forest;
             while roots > 1 && forest[roots - 2] <= forest[roots - 1] {
                 roots -= 1;
             }
@@ -220,7 +128,7 @@ fn children<const W: usize>(forests: &impl Forests, node: usize) -> ([usize; W],
             children[count] = node;
             count += 1;
         } else {
-            len += cut(forests, node, roots, &mut todo[len..]);
+            len += cut(collapse, node, roots, &mut todo[len..]);
         }
     }
     (children, count)
@@ -228,11 +136,16 @@ fn children<const W: usize>(forests: &impl Forests, node: usize) -> ([usize; W],
 
 /// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
 #[inline(always)]
-fn cut(forests: &impl Forests, node: usize, roots: usize, out: &mut [(usize, usize)]) -> usize {
-    let [left, right] = forests.below(node);
+fn cut<const W: usize>(
+    collapse: &Collapse<W>,
+    node: usize,
+    roots: usize,
+    out: &mut [(usize, usize)],
+) -> usize {
+    let [left, right] = collapse.nodes[node].children();
     let mut best = 1;
     if roots > 2 {
-        let (lefts, rights) = (forests.forest(left), forests.forest(right));
+        let [lefts, rights] = [left, right].map(|child| &collapse.entries[child].forest);
         let cost = |k: usize| lefts[k - 1] + rights[roots - k - 1];
         for k in 2..roots {
             if cost(k) < cost(best) {

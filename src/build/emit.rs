@@ -48,11 +48,8 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     collapse: &Collapse<W>,
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
-    let (nodes, leaves) = walk(collapse, watch)?;
-    let ranges: Vec<_> = leaves
-        .into_iter()
-        .map(|leaf| collapse.places(leaf as usize))
-        .collect();
+    let mut ranges = Vec::new();
+    let nodes = walk(collapse, watch, |leaf| ranges.push(collapse.places(leaf)))?;
     let (leaves, primitives) = fill(input, tree.order(), &ranges, watch)?;
     watch.check()?;
     let bounds = tree.nodes().first().map_or(Aabb::EMPTY, |root| root.aabb);
@@ -64,26 +61,27 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     })
 }
 
-/// The wide nodes, and the binary ones that become leaves, both in the layout's order.
+/// The wide nodes, in the layout's order; `leaf` is told of the binary ones that become leaves, in theirs.
 ///
 /// # Errors
 /// As [`emit`].
 pub(super) fn walk<N: WideNode, const W: usize>(
     shape: &impl Shape<W>,
     watch: &Watch,
-) -> Result<(Vec<N>, Vec<u32>), BuildError> {
+    mut leaf: impl FnMut(usize),
+) -> Result<Vec<N>, BuildError> {
     if shape.len() == 0 {
-        return Ok((Vec::new(), Vec::new()));
+        return Ok(Vec::new());
     }
     // Most trees have more than four leaves a wide node. What is not used is not touched.
     let mut nodes = Vec::with_capacity(shape.len() / 8 + 1);
-    let mut leaves = Vec::with_capacity(shape.len() / 2 + 1);
+    let mut leaves = 0;
     let root = shape.root();
     let measure = Measure::of_bounds(shape.aabb(root));
     // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
     let mut todo = Vec::new();
     if shape.is_leaf(root) {
-        leaves.push(root as u32);
+        leaf(root);
     } else {
         nodes.push(N::zeroed());
         todo.push((root, 0, 0));
@@ -112,8 +110,9 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         let (known, first) = (todo.len(), nodes.len());
         let lanes = lanes[..count].iter().map(|&(_, child)| {
             let link = if shape.is_leaf(child) {
-                leaves.push(child as u32);
-                Child::leaf(leaves.len() as u32 - 1)
+                leaf(child);
+                leaves += 1;
+                Child::leaf(leaves - 1)
             } else {
                 let place = first + todo.len() - known;
                 todo.push((child, place, used));
@@ -129,7 +128,7 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         }
     }
     nodes.shrink_to_fit();
-    Ok((nodes, leaves))
+    Ok(nodes)
 }
 
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.

@@ -2,9 +2,9 @@
 
 use super::{
     BuildError,
-    collapse::LeafCollapse,
     emit::{Parts, walk},
     input::Input,
+    leaf_collapse::LeafCollapse,
     monitor::Watch,
     morton::{self, Curve},
     ploc::{self, Node},
@@ -30,18 +30,16 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
     watch: &Watch,
 ) -> Result<(Parts<N, I::Leaf>, usize), BuildError> {
     let curve = morton::curve(input, drop_non_finite, watch)?;
-    let Grown {
-        mut leaves, nodes, ..
-    } = Grown::of(input, &curve, watch)?;
+    let Grown { leaves, nodes, .. } = Grown::of(input, &curve, watch)?;
     watch.phase(0.93, nodes.len())?;
     let collapse = LeafCollapse::<W>::new::<I>(&nodes, watch);
     watch.phase(1.0, nodes.len())?;
-    let (wide, mut order) = walk(&collapse, watch)?;
-    for place in &mut order {
-        *place = nodes[*place as usize].number() as u32;
-    }
-    permute(&mut leaves, &mut order);
-    leaves.shrink_to_fit();
+    let mut order = Vec::with_capacity(leaves.len());
+    let wide = walk(&collapse, watch, |leaf| {
+        order.push(nodes[leaf].number() as u32);
+    })?;
+    // Not one by one in the walk, nor in place along cycles: each would wait for the one before.
+    let leaves = order.iter().map(|&leaf| leaves[leaf as usize]).collect();
     let parts = Parts {
         nodes: wide,
         leaves,
@@ -49,24 +47,6 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
         bounds: nodes.last().map_or(Aabb::EMPTY, |root| root.aabb),
     };
     Ok((parts, curve.dropped))
-}
-
-/// Puts in each place what was in the place that `from` has for it, every place once. In the end `from` has each
-/// place's own.
-fn permute<T: Copy>(all: &mut [T], from: &mut [u32]) {
-    for start in 0..from.len() {
-        let first = all[start];
-        let mut place = start;
-        loop {
-            let next = core::mem::replace(&mut from[place], place as u32) as usize;
-            if next == start {
-                break;
-            }
-            all[place] = all[next];
-            place = next;
-        }
-        all[place] = first;
-    }
 }
 
 /// Leaves and the tree over them.
@@ -159,22 +139,5 @@ impl<L: Copy + Send> Grown<L> {
         ploc::join(&mut self.nodes, roots, 1, scale, watch);
         watch.check()?;
         Ok(self)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn permuted() {
-        for count in [0, 1, 2, 9, 30] {
-            // 7 has no factor in common with one more.
-            let from: Vec<u32> = (1..=count).map(|i| 7 * i % (count + 1) - 1).collect();
-            let expected: Vec<_> = from.iter().map(|place| 10 * place).collect();
-            let mut all: Vec<_> = (0..count).map(|i| 10 * i).collect();
-            permute(&mut all, &mut from.clone());
-            assert_eq!(all, expected);
-        }
     }
 }

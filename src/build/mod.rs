@@ -12,7 +12,8 @@
 //!
 //! 1. `morton`: the primitives along a curve.
 //! 2. `runs`: leaves of what follows each other.
-//! 3. `ploc`: the binary tree over leaves, from the bottom up; then 4 and 6 as above.
+//! 3. `ploc`: the binary tree over leaves, from the bottom up.
+//! 4. `leaf_collapse`: as 4 above; then the walk of `emit`.
 //!
 //! `refit` makes boxes anew when primitives have moved.
 //!
@@ -34,6 +35,7 @@ mod fill;
 mod group;
 mod input;
 mod lay_out;
+mod leaf_collapse;
 mod monitor;
 mod morton;
 mod parallel;
