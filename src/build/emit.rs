@@ -11,9 +11,9 @@ use super::{
 use crate::{
     geometry::Aabb,
     layout::{Child, LayoutError, STACK, WideNode},
-    simd::Backend,
+    simd::{Backend, Operation, Simd},
 };
-use core::ops::Range;
+use core::{marker::PhantomData, ops::Range};
 use std::vec::Vec;
 
 /// The parts that [`Bvh::from_parts`](crate::layout::Bvh::from_parts) takes.
@@ -68,67 +68,94 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
 pub(super) fn walk<N: WideNode, const W: usize>(
     shape: &impl Shape<W>,
     watch: &Watch,
-    mut leaf: impl FnMut(usize),
+    leaf: impl FnMut(usize),
 ) -> Result<Vec<N>, BuildError> {
-    if shape.len() == 0 {
-        return Ok(Vec::new());
-    }
-    // Most trees have more than four leaves a wide node. What is not used is not touched.
-    let mut nodes = Vec::with_capacity(shape.len() / 8 + 1);
-    let mut leaves = 0;
-    let root = shape.root();
-    let measure = Measure::of_bounds(shape.aabb(root));
-    // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
-    let mut todo = Vec::new();
-    if shape.is_leaf(root) {
-        leaf(root);
-    } else {
-        nodes.push(N::zeroed());
-        todo.push((root, 0, 0));
-    }
-    while let Some((node, place, used)) = todo.pop() {
-        let (children, count) = shape.children(node);
-        let used = used + count - 1;
-        if used >= STACK {
-            return Err(LayoutError::TooDeep(place).into());
+    Backend::detect().run(Walk {
+        shape,
+        watch,
+        leaf,
+        nodes: PhantomData,
+    })
+}
+
+struct Walk<'a, N, T, F, const W: usize> {
+    shape: &'a T,
+    watch: &'a Watch<'a>,
+    leaf: F,
+    nodes: PhantomData<N>,
+}
+
+impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Walk<'_, N, T, F, W> {
+    type Output = Result<Vec<N>, BuildError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Self::Output {
+        let Self {
+            shape,
+            watch,
+            mut leaf,
+            ..
+        } = self;
+        if shape.len() == 0 {
+            return Ok(Vec::new());
         }
-        // The likeliest first: its nodes follow, close by.
-        let mut lanes = [(0.0, 0); W];
-        for (lane, &child) in children[..count].iter().enumerate() {
-            let area = measure.half_area(shape.aabb(child));
-            // By insertion: there are few, and equals stay in order.
-            let mut place = lane;
-            while place > 0 && lanes[place - 1].0 < area {
-                lanes[place] = lanes[place - 1];
-                place -= 1;
+        // Most trees have more than four leaves a wide node. What is not used is not touched.
+        let mut nodes = Vec::with_capacity(shape.len() / 8 + 1);
+        let mut leaves = 0;
+        let root = shape.root();
+        let measure = Measure::of_bounds(shape.aabb(root));
+        // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
+        let mut todo = Vec::new();
+        if shape.is_leaf(root) {
+            leaf(root);
+        } else {
+            nodes.push(N::zeroed());
+            todo.push((root, 0, 0));
+        }
+        while let Some((node, place, used)) = todo.pop() {
+            let (children, count) = shape.children(node);
+            let used = used + count - 1;
+            if used >= STACK {
+                return Err(LayoutError::TooDeep(place).into());
             }
-            lanes[place] = (area, child);
+            // The likeliest first: its nodes follow, close by.
+            let mut lanes = [(0.0, 0); W];
+            for (lane, &child) in children[..count].iter().enumerate() {
+                let area = measure.half_area(shape.aabb(child));
+                // By insertion: there are few, and equals stay in order.
+                let mut place = lane;
+                while place > 0 && lanes[place - 1].0 < area {
+                    lanes[place] = lanes[place - 1];
+                    place -= 1;
+                }
+                lanes[place] = (area, child);
+            }
+            if N::NODES_FIRST {
+                lanes[..count].sort_by_key(|&(_, child)| shape.is_leaf(child));
+            }
+            let (known, first) = (todo.len(), nodes.len());
+            let lanes = lanes[..count].iter().map(|&(_, child)| {
+                let link = if shape.is_leaf(child) {
+                    leaf(child);
+                    leaves += 1;
+                    Child::leaf(leaves - 1)
+                } else {
+                    let place = first + todo.len() - known;
+                    todo.push((child, place, used));
+                    Child::node(place as u32)
+                };
+                (*shape.aabb(child), link)
+            });
+            nodes[place] = N::from_children(lanes);
+            nodes.resize(first + todo.len() - known, N::zeroed());
+            todo[known..].reverse();
+            if !watch.advance(count) {
+                return Err(BuildError::Cancelled);
+            }
         }
-        if N::NODES_FIRST {
-            lanes[..count].sort_by_key(|&(_, child)| shape.is_leaf(child));
-        }
-        let (known, first) = (todo.len(), nodes.len());
-        let lanes = lanes[..count].iter().map(|&(_, child)| {
-            let link = if shape.is_leaf(child) {
-                leaf(child);
-                leaves += 1;
-                Child::leaf(leaves - 1)
-            } else {
-                let place = first + todo.len() - known;
-                todo.push((child, place, used));
-                Child::node(place as u32)
-            };
-            (*shape.aabb(child), link)
-        });
-        nodes[place] = N::from_children(lanes);
-        nodes.resize(first + todo.len() - known, N::zeroed());
-        todo[known..].reverse();
-        if !watch.advance(count) {
-            return Err(BuildError::Cancelled);
-        }
+        nodes.shrink_to_fit();
+        Ok(nodes)
     }
-    nodes.shrink_to_fit();
-    Ok(nodes)
 }
 
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.

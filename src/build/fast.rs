@@ -10,7 +10,11 @@ use super::{
     ploc::{self, Node},
     runs::{self, Runs},
 };
-use crate::{geometry::Aabb, layout::WideNode};
+use crate::{
+    geometry::Aabb,
+    layout::WideNode,
+    simd::{Backend, Operation, Simd},
+};
 use std::vec::Vec;
 
 /// So many primitives are one task, along the curve.
@@ -39,7 +43,10 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
         order.push(nodes[leaf].number() as u32);
     })?;
     // Not one by one in the walk, nor in place along cycles: each would wait for the one before.
-    let leaves = order.iter().map(|&leaf| leaves[leaf as usize]).collect();
+    let leaves = Backend::detect().run(InOrder {
+        all: &leaves,
+        order: &order,
+    });
     let parts = Parts {
         nodes: wide,
         leaves,
@@ -47,6 +54,25 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
         bounds: nodes.last().map_or(Aabb::EMPTY, |root| root.aabb),
     };
     Ok((parts, curve.dropped))
+}
+
+/// Copies of all at the places of an order.
+struct InOrder<'a, T> {
+    all: &'a [T],
+    order: &'a [u32],
+}
+
+impl<T: Copy> Operation for InOrder<'_, T> {
+    type Output = Vec<T>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Vec<T> {
+        let mut copies = Vec::with_capacity(self.order.len());
+        for &place in self.order {
+            copies.push(self.all[place as usize]);
+        }
+        copies
+    }
 }
 
 /// Leaves and the tree over them.

@@ -16,8 +16,7 @@ impl Corners {
     pub const NONE: Self = Self([[0.0; 4]; 3]);
 
     #[inline(always)]
-    pub fn new(mesh: &TriangleMesh, id: u32) -> Self {
-        let [a, b, c] = mesh.indices()[id as usize];
+    pub fn new(mesh: &TriangleMesh, [a, b, c]: [u32; 3]) -> Self {
         let positions = mesh.positions();
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = [
             positions[a as usize],

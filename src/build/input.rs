@@ -32,6 +32,8 @@ pub(super) trait Input: Sync {
     type Leaf: Leaf + Send;
     /// A leaf while it is filled, in a backend's vectors.
     type Filling<S: Simd>: Copy;
+    /// Where what a leaf has of a primitive is.
+    type Place: Copy + Default;
     /// What a leaf has of a primitive.
     type Loaded: Copy;
     /// That of no primitive.
@@ -55,8 +57,15 @@ pub(super) trait Input: Sync {
     fn primitive(&self, number: u32) -> u32;
     /// A finite box around all that are kept; not the least.
     fn around(&self) -> Bounds;
+    /// Where what a leaf has of a primitive is.
+    fn place(&self, id: u32) -> Self::Place;
+    /// What a leaf has of the primitive at a place.
+    fn load_from(&self, place: Self::Place) -> Self::Loaded;
     /// What a leaf has of a primitive.
-    fn load(&self, id: u32) -> Self::Loaded;
+    #[inline(always)]
+    fn load(&self, id: u32) -> Self::Loaded {
+        self.load_from(self.place(id))
+    }
     /// The box around it, but for the sign of zeros.
     fn bounds(loaded: &Self::Loaded) -> Bounds;
     /// A leaf of one primitive that is kept.
@@ -158,6 +167,7 @@ fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
 impl Input for Triangles<'_> {
     type Leaf = TriangleLeaf;
     type Filling<S: Simd> = Filling<S>;
+    type Place = [u32; 3];
     type Loaded = Corners;
     const UNLOADED: Corners = Corners::NONE;
     const MAX_LEAF: usize = TriangleLeaf::MAX_TRIANGLES;
@@ -211,8 +221,13 @@ impl Input for Triangles<'_> {
     }
 
     #[inline(always)]
-    fn load(&self, id: u32) -> Corners {
-        Corners::new(self.0, id)
+    fn place(&self, id: u32) -> [u32; 3] {
+        self.0.indices()[id as usize]
+    }
+
+    #[inline(always)]
+    fn load_from(&self, vertices: [u32; 3]) -> Corners {
+        Corners::new(self.0, vertices)
     }
 
     #[inline(always)]
@@ -253,6 +268,7 @@ impl Input for Boxes<'_> {
     type Leaf = PrimitiveLeaf;
     /// How many there are.
     type Filling<S: Simd> = usize;
+    type Place = u32;
     type Loaded = Aabb;
     const UNLOADED: Aabb = Aabb::EMPTY;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
@@ -296,7 +312,12 @@ impl Input for Boxes<'_> {
     }
 
     #[inline(always)]
-    fn load(&self, id: u32) -> Aabb {
+    fn place(&self, id: u32) -> u32 {
+        id
+    }
+
+    #[inline(always)]
+    fn load_from(&self, id: u32) -> Aabb {
         self.aabb(id)
     }
 
@@ -335,6 +356,7 @@ impl Input for TrianglesInRuns<'_> {
     type Leaf = PrimitiveLeaf;
     /// How many there are.
     type Filling<S: Simd> = usize;
+    type Place = u32;
     type Loaded = Aabb;
     const UNLOADED: Aabb = Aabb::EMPTY;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
@@ -370,7 +392,12 @@ impl Input for TrianglesInRuns<'_> {
     }
 
     #[inline(always)]
-    fn load(&self, id: u32) -> Aabb {
+    fn place(&self, id: u32) -> u32 {
+        id
+    }
+
+    #[inline(always)]
+    fn load_from(&self, id: u32) -> Aabb {
         self.aabb(id)
     }
 

@@ -110,9 +110,8 @@ pub(super) fn curve<I: Input>(
         gathered = keys(Grid::new(&gathered.bounds))?;
     }
     watch.phase(0.3, gathered.all.len())?;
-    sort(&mut gathered.all);
     Ok(Curve {
-        order: gathered.all.iter().map(|&key| id(key)).collect(),
+        order: sorted(gathered.all),
         dropped: gathered.dropped,
         scale: gathered.bounds.measure().scale(),
     })
@@ -122,34 +121,52 @@ fn id(key: u64) -> u32 {
     key as u32 & ((1 << ID_BITS) - 1)
 }
 
-/// Sorts keys, no two of which are the same, and which are in order below the code.
-fn sort(keys: &mut Vec<u64>) {
+/// The numbers in keys, which are in order below the code, in the order of keys.
+fn sorted(mut keys: Vec<u64>) -> Vec<u32> {
     #[cfg(feature = "rayon")]
     if rayon::current_num_threads() > 3 {
         use rayon::slice::ParallelSliceMut;
         keys.par_sort_unstable();
-        return;
+        return keys.into_iter().map(id).collect();
     }
-    let digit =
-        |key: u64, digit: usize| (key >> (ID_BITS + BITS * digit as u32)) as usize & (CELLS - 1);
     let mut counts = [[0u32; CELLS]; DIGITS];
-    for &key in keys.iter() {
+    for &key in &keys {
         for (place, counts) in counts.iter_mut().enumerate() {
             counts[digit(key, place)] += 1;
         }
     }
-    let mut sorted = vec![0; keys.len()];
-    for (place, counts) in counts.iter_mut().enumerate() {
-        let mut next = 0;
-        for count in counts.iter_mut() {
-            next += core::mem::replace(count, next);
-        }
-        for &key in keys.iter() {
-            let count = &mut counts[digit(key, place)];
-            sorted[*count as usize] = key;
-            *count += 1;
-        }
-        core::mem::swap(keys, &mut sorted);
+    let mut other = vec![0; keys.len()];
+    let [low, middle, high] = counts;
+    sort_by_digit(0, low, &keys, &mut other, |key| key);
+    sort_by_digit(1, middle, &other, &mut keys, |key| key);
+    drop(other);
+    let mut order = vec![0; keys.len()];
+    sort_by_digit(2, high, &keys, &mut order, id);
+    order
+}
+
+#[inline(always)]
+fn digit(key: u64, place: usize) -> usize {
+    (key >> (ID_BITS + BITS * place as u32)) as usize & (CELLS - 1)
+}
+
+/// Puts what is made of keys in the order of a digit, of which it is counted how often each is there.
+#[inline(always)]
+fn sort_by_digit<T>(
+    place: usize,
+    mut counts: [u32; CELLS],
+    keys: &[u64],
+    to: &mut [T],
+    make: impl Fn(u64) -> T,
+) {
+    let mut next = 0;
+    for count in &mut counts {
+        next += core::mem::replace(count, next);
+    }
+    for &key in keys {
+        let count = &mut counts[digit(key, place)];
+        to[*count as usize] = make(key);
+        *count += 1;
     }
 }
 

@@ -48,6 +48,7 @@ impl<'a, I: Input> Pieces<'a, I> {
 impl<I: Input> Input for Pieces<'_, I> {
     type Leaf = I::Leaf;
     type Filling<S: Simd> = I::Filling<S>;
+    type Place = I::Place;
     type Loaded = I::Loaded;
     const UNLOADED: I::Loaded = I::UNLOADED;
     const MAX_LEAF: usize = I::MAX_LEAF;
@@ -84,8 +85,13 @@ impl<I: Input> Input for Pieces<'_, I> {
     }
 
     #[inline(always)]
-    fn load(&self, number: u32) -> I::Loaded {
-        self.input.load(self.primitive(number))
+    fn place(&self, number: u32) -> I::Place {
+        self.input.place(self.primitive(number))
+    }
+
+    #[inline(always)]
+    fn load_from(&self, place: I::Place) -> I::Loaded {
+        self.input.load_from(place)
     }
 
     #[inline(always)]

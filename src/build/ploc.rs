@@ -18,8 +18,9 @@ const SLOT: u32 = SLOTS as u32 - 1;
 /// All but its own and the last, which has no partner on the other side.
 const OTHERS: u32 = 0b0111_0111;
 
-/// A node of the tree, after those below it.
+/// A node of the tree, after those below it. It is never in two cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 pub(super) struct Node {
     pub aabb: Aabb,
     /// A leaf's number, or the place of the first child.
@@ -99,7 +100,11 @@ pub(super) fn join(
     while clusters.places.len() > until.max(1) {
         let count = clusters.places.len();
         clusters.search(backend, &mut nearest[..count]);
-        let left = clusters.join_pairs(nodes, &nearest[..count]);
+        let left = backend.run(JoinPairs {
+            clusters: &mut clusters,
+            nodes,
+            nearest: &nearest[..count],
+        });
         // Clusters that all like the one before better than the one after are joined one a round. Then it
         // is halves.
         if left > count - count / 16 {
@@ -107,7 +112,11 @@ pub(super) fn join(
             for (other, place) in halves.iter_mut().zip(0u32..) {
                 *other = (place ^ 1).min(left as u32 - 1);
             }
-            clusters.join_pairs(nodes, halves);
+            backend.run(JoinPairs {
+                clusters: &mut clusters,
+                nodes,
+                nearest: halves,
+            });
         }
         if !watch.advance(count - clusters.places.len()) {
             break;
@@ -178,6 +187,7 @@ impl Clusters {
     }
 
     /// Joins those that are each other's nearest: how many are left.
+    #[inline(always)]
     fn join_pairs(&mut self, nodes: &mut Vec<Node>, nearest: &[u32]) -> usize {
         let Self {
             planes,
@@ -223,6 +233,21 @@ impl Clusters {
         places.truncate(left);
         self.end();
         left
+    }
+}
+
+struct JoinPairs<'a> {
+    clusters: &'a mut Clusters,
+    nodes: &'a mut Vec<Node>,
+    nearest: &'a [u32],
+}
+
+impl Operation for JoinPairs<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> usize {
+        self.clusters.join_pairs(self.nodes, self.nearest)
     }
 }
 

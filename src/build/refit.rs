@@ -246,7 +246,7 @@ impl Operation for Refill<'_> {
     fn run<S: Simd>(self, token: S) -> Self::Output {
         let mut filling: Option<Filling<S>> = None;
         for (triangle, &id) in self.ids.iter().enumerate() {
-            let corners = Corners::new(self.mesh, id);
+            let corners = Corners::new(self.mesh, self.mesh.indices()[id as usize]);
             let has_area = self.have_area & 1 << triangle != 0;
             match &mut filling {
                 None if has_area => filling = Some(Filling::of(token, &corners)),

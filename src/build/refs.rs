@@ -6,7 +6,10 @@ use super::{
     input::{Input, Verdict},
     monitor::Watch,
 };
-use crate::geometry::{Aabb, TriangleMesh};
+use crate::{
+    geometry::{Aabb, TriangleMesh},
+    simd::{Backend, Operation, Simd},
+};
 use glam::Vec3;
 use std::{vec, vec::Vec};
 use wide::f32x4;
@@ -208,9 +211,16 @@ pub(super) fn gather<I: Input, T: Copy + Send>(
     }
     watch.phase(GATHERED, input.len())?;
     let mut all = vec![none; input.len()];
+    let backend = Backend::detect();
     let gather = |(chunk, all): (usize, &mut [T])| {
         watch.advance(all.len());
-        gather_chunk(input, chunk * CHUNK, all, drop_non_finite, &make)
+        backend.run(GatherChunk {
+            input,
+            start: chunk * CHUNK,
+            all,
+            drop_non_finite,
+            make: &make,
+        })
     };
     #[cfg(feature = "rayon")]
     let gathered: Vec<_> = {
@@ -249,29 +259,43 @@ struct Chunk {
 }
 
 /// Fills the front of `all` with what is made of primitives that are kept, of those from `start` on.
-fn gather_chunk<I: Input, T>(
-    input: &I,
+struct GatherChunk<'a, I, T, F> {
+    input: &'a I,
     start: usize,
-    all: &mut [T],
+    all: &'a mut [T],
     drop_non_finite: bool,
-    make: &impl Fn(&Bounds, u32) -> T,
-) -> Result<Chunk, BuildError> {
-    let mut chunk = Chunk {
-        kept: 0,
-        dropped: 0,
-        bounds: Bounds::EMPTY,
-    };
-    for id in start..start + all.len() {
-        match input.verdict(id as u32) {
-            Verdict::Keep(bounds) => {
-                chunk.bounds = chunk.bounds.join(bounds);
-                all[chunk.kept] = make(&bounds, id as u32);
-                chunk.kept += 1;
+    make: &'a F,
+}
+
+impl<I: Input, T, F: Fn(&Bounds, u32) -> T> Operation for GatherChunk<'_, I, T, F> {
+    type Output = Result<Chunk, BuildError>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> Self::Output {
+        let Self {
+            input,
+            start,
+            all,
+            drop_non_finite,
+            make,
+        } = self;
+        let mut chunk = Chunk {
+            kept: 0,
+            dropped: 0,
+            bounds: Bounds::EMPTY,
+        };
+        for id in start..start + all.len() {
+            match input.verdict(id as u32) {
+                Verdict::Keep(bounds) => {
+                    chunk.bounds = chunk.bounds.join(bounds);
+                    all[chunk.kept] = make(&bounds, id as u32);
+                    chunk.kept += 1;
+                }
+                Verdict::Unhittable => {}
+                Verdict::NonFinite(_) if drop_non_finite => chunk.dropped += 1,
+                Verdict::NonFinite(error) | Verdict::Invalid(error) => return Err(error),
             }
-            Verdict::Unhittable => {}
-            Verdict::NonFinite(_) if drop_non_finite => chunk.dropped += 1,
-            Verdict::NonFinite(error) | Verdict::Invalid(error) => return Err(error),
         }
+        Ok(chunk)
     }
-    Ok(chunk)
 }

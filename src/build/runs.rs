@@ -60,10 +60,14 @@ impl<I: Input> Operation for Cut<'_, I> {
         let mut cost = f32::INFINITY;
         let mut count = 0;
         let mut place = first;
+        let mut places = [I::Place::default(); AHEAD];
         let mut ahead = [I::UNLOADED; AHEAD];
         for ids in ids.chunks(AHEAD) {
-            for (loaded, &id) in ahead.iter_mut().zip(ids) {
-                *loaded = input.load(id);
+            for (place, &id) in places.iter_mut().zip(ids) {
+                *place = input.place(id);
+            }
+            for (loaded, &place) in ahead.iter_mut().zip(&places[..ids.len()]) {
+                *loaded = input.load_from(place);
             }
             for loaded in &ahead[..ids.len()] {
                 let own = I::bounds(loaded);
