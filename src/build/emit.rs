@@ -36,6 +36,9 @@ pub(super) trait Shape<const W: usize> {
     fn is_leaf(&self, node: usize) -> bool;
     /// The children of a node that becomes a wide one, and how many.
     fn children(&self, node: usize) -> ([usize; W], usize);
+    /// Has fetched what [`children`](Self::children) of a node is going to read.
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, _token: S, _node: usize) {}
 }
 
 /// Emits a tree as it was collapsed.
@@ -89,7 +92,7 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
     type Output = Result<Vec<N>, BuildError>;
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> Self::Output {
+    fn run<S: Simd>(self, token: S) -> Self::Output {
         let Self {
             shape,
             watch,
@@ -142,6 +145,7 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
                 } else {
                     let place = first + todo.len() - known;
                     todo.push((child, place, used));
+                    shape.fetch(token, child);
                     Child::node(place as u32)
                 };
                 (*shape.aabb(child), link)

@@ -82,6 +82,13 @@ impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
         }
         (children, count)
     }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, node: usize) {
+        for child in self.nodes[node].children() {
+            token.prefetch((&raw const self.nodes[child]).cast());
+        }
+    }
 }
 
 /// How the cheapest forests below a node are made.

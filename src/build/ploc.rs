@@ -137,24 +137,24 @@ struct Clusters {
 
 impl Clusters {
     fn new(nodes: &[Node], places: Vec<u32>, scale: f32) -> Self {
-        let mut planes = [-FAR, -FAR, -FAR, FAR, FAR, FAR].map(|far| {
-            let mut planes = Vec::with_capacity(places.len() + SLOTS);
-            planes.resize(RADIUS, far);
-            planes
-        });
-        for &place in &places {
-            let sides = sides(&nodes[place as usize].aabb, scale);
-            for (planes, x) in planes.iter_mut().zip(sides) {
-                planes.push(x);
+        let count = places.len();
+        let mut planes = [-FAR, -FAR, -FAR, FAR, FAR, FAR].map(|far| vec![far; count + SLOTS]);
+        {
+            let [x0, y0, z0, x1, y1, z1] = planes
+                .each_mut()
+                .map(|planes| &mut planes[RADIUS..RADIUS + count]);
+            for (index, &place) in places.iter().enumerate() {
+                let sides = sides(&nodes[place as usize].aabb, scale);
+                [
+                    x0[index], y0[index], z0[index], x1[index], y1[index], z1[index],
+                ] = sides;
             }
         }
-        let mut clusters = Self {
+        Self {
             planes,
             places,
             scale,
-        };
-        clusters.end();
-        clusters
+        }
     }
 
     /// Puts what is far after the last.
