@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 55 to 92 | 0.78 |
-/// | [`Balanced`](Self::Balanced) | 290 to 520 | 0.95 |
-/// | [`Best`](Self::Best) | 910 to 1,430 | 1 |
+/// | [`Fast`](Self::Fast) | 63 to 100 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 380 to 500 | 0.94 |
+/// | [`Best`](Self::Best) | 1,120 to 1,540 | 1 |
 ///
 /// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
