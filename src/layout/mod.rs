@@ -13,8 +13,8 @@ mod node;
 mod run;
 mod storage;
 
-#[cfg(feature = "std")]
 pub use approximate::Approximate;
+#[cfg(feature = "std")]
 pub(crate) use bvh::tested_bounds;
 pub use bvh::{
     Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, PrimitiveBvh4Ref,
