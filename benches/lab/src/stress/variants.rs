@@ -321,13 +321,11 @@ fn ask_at_once<N: WideNode, L: TriangleLeaves, S: Storage>(
     bvh.closest_hits(rays, &mut hits);
     bvh.any_hits(rays, &mut occluded);
     compare(["closest_hits", "any_hits"], 0, &hits, &occluded)?;
-    // The same waves as in batches, of fewer rays at a time: some will do.
-    let some = rays.len().div_ceil(4);
-    let (rays_in, hits, occluded) = (&rays[..some], &mut hits[..some], &mut occluded[..some]);
     let mut scratch = Scratch::<5>::new();
-    bvh.closest_hits_in(&mut scratch, rays_in, hits);
-    bvh.any_hits_in(&mut scratch, rays_in, occluded);
-    compare(["closest_hits_in", "any_hits_in"], 0, hits, occluded)?;
+    bvh.closest_hits_in(&mut scratch, rays, &mut hits);
+    bvh.any_hits_in(&mut scratch, rays, &mut occluded);
+    let call = ["closest_hits_in", "any_hits_in"];
+    compare(call, 0, &hits, &occluded)?;
     // The same bundles as in batches, of fewer rays: some will do.
     for (packet, rays) in rays.chunks_exact(8).enumerate().step_by(4) {
         let Some(rays) = rays.first_chunk::<8>() else {
