@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         results.add_scene(scene, sets, args, &effort)?;
     }
     let needles = rays::needles();
-    let sets = |_: &Bvh8| vec![rays::at_faces(&needles, effort.rays)];
+    let sets = |_: &Bvh8| vec![rays::at_needles(&needles, effort.rays)];
     results.add_scene(&needles, sets, args, &effort)?;
     let Tables {
         records,

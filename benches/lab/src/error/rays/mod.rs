@@ -105,8 +105,8 @@ pub fn needles() -> Mesh {
     }
 }
 
-/// Rays at points of triangles, from as far away as the mesh is wide.
-pub fn at_faces(mesh: &Mesh, size: usize) -> RaySet {
+/// Rays at points of needles, from as far away as the mesh is wide.
+pub fn at_needles(mesh: &Mesh, size: usize) -> RaySet {
     let mut rng = Rng::with_seed(4);
     let (min, max) = mesh.bounds();
     let (min, max) = (Vec3::from(min), Vec3::from(max));
