@@ -10,18 +10,18 @@
 use super::{
     binary::{BinaryNode, BinaryTree},
     cost::{self, Measure},
+    cuts::{Cuts, Forest, Joined, MAX_WIDTH},
     emit::Shape,
     input::{Input, leaf_of},
     monitor::{STRIDE, Watch},
     sweep::Leaves,
 };
-use crate::{geometry::Aabb, simd::Backend};
+use crate::{
+    geometry::Aabb,
+    simd::{Backend, Operation, Simd},
+};
 use core::ops::Range;
 use std::{vec, vec::Vec};
-use wide::f32x4;
-
-/// The widest node there is.
-pub(super) const MAX_WIDTH: usize = 8;
 
 /// Subtrees of up to so many nodes are one task.
 const TASK_NODES: usize = 1 << 14;
@@ -29,8 +29,9 @@ const TASK_NODES: usize = 1 << 14;
 /// What is known of a binary node.
 #[derive(Clone, Copy)]
 struct Entry {
-    /// C(n, 1) to C(n, W).
-    forest: [f32; MAX_WIDTH],
+    forest: Forest,
+    /// How they are made.
+    cuts: Cuts,
     /// Where its primitives begin in the tree's order.
     first: u32,
     /// How many primitives it has, or 255 if more.
@@ -43,7 +44,8 @@ struct Entry {
 
 impl Entry {
     const NONE: Self = Self {
-        forest: [0.0; _],
+        forest: [0.0; MAX_WIDTH],
+        cuts: Cuts::NONE,
         first: 0,
         count: 0,
         fits: false,
@@ -60,7 +62,6 @@ pub(super) struct Collapse<'a, const W: usize> {
 impl<'a, const W: usize> Collapse<'a, W> {
     /// Of a tree in our order, whose leaves all fit, and are as full as they can be where it was built to have such.
     pub fn new<I: Input>(input: &I, tree: &'a BinaryTree, leaves: Leaves, watch: &Watch) -> Self {
-        const { assert!(W >= 2 && W <= MAX_WIDTH) };
         let nodes = tree.nodes();
         let mut entries = vec![Entry::NONE; nodes.len()];
         if let Some(root) = nodes.first() {
@@ -102,92 +103,13 @@ impl<const W: usize> Shape<W> for Collapse<'_, W> {
         self.entries[node].is_leaf
     }
 
-    fn children(&self, node: usize) -> ([usize; W], usize) {
-        children(self, node)
+    fn below(&self, node: usize) -> [usize; 2] {
+        self.nodes[node].children()
     }
-}
 
-/// The children of a node that becomes a wide one, in the binary tree's order.
-#[inline(always)]
-fn children<const W: usize>(collapse: &Collapse<W>, node: usize) -> ([usize; W], usize) {
-    let (mut children, mut count) = ([0; W], 0);
-    // Forests still to be taken apart, and how many roots each may have: never more than W in all.
-    let mut todo = [(0, 0); W];
-    let mut len = cut(collapse, node, W, &mut todo);
-    while len > 0 {
-        len -= 1;
-        let (node, mut roots) = todo[len];
-        if roots > 1 {
-            // As few roots as do for the cost.
-            let forest = &collapse.entries[node].forest;
-            while roots > 1 && forest[roots - 2] <= forest[roots - 1] {
-                roots -= 1;
-            }
-        }
-        if roots == 1 {
-            children[count] = node;
-            count += 1;
-        } else {
-            len += cut(collapse, node, roots, &mut todo[len..]);
-        }
+    fn cuts(&self, node: usize) -> Cuts {
+        self.entries[node].cuts
     }
-    (children, count)
-}
-
-/// The two forests, right then left, that make the cheapest forest of `roots` trees, more than one.
-#[inline(always)]
-fn cut<const W: usize>(
-    collapse: &Collapse<W>,
-    node: usize,
-    roots: usize,
-    out: &mut [(usize, usize)],
-) -> usize {
-    let [left, right] = collapse.nodes[node].children();
-    let mut best = 1;
-    if roots > 2 {
-        let [lefts, rights] = [left, right].map(|child| &collapse.entries[child].forest);
-        let cost = |k: usize| lefts[k - 1] + rights[roots - k - 1];
-        for k in 2..roots {
-            if cost(k) < cost(best) {
-                best = k;
-            }
-        }
-    }
-    out[0] = (right, roots - best);
-    out[1] = (left, best);
-    2
-}
-
-/// At most so many roots, not just so many.
-#[inline(always)]
-fn least_so_far<const W: usize>(forest: &mut [f32; MAX_WIDTH]) {
-    for i in 1..W {
-        if forest[i - 1] < forest[i] {
-            forest[i] = forest[i - 1];
-        }
-    }
-}
-
-/// C(left, k) + C(right, i - k), the least over k, for all i from 2 on; in the first place is nothing.
-#[inline(always)]
-fn forest<const W: usize>(left: &[f32; MAX_WIDTH], right: &[f32; MAX_WIDTH]) -> [f32; MAX_WIDTH] {
-    // Row k is `right` after k places that are never the least.
-    let mut shifted = [f32::INFINITY; 2 * MAX_WIDTH];
-    shifted[MAX_WIDTH..].copy_from_slice(right);
-    let row = |k: usize| {
-        let at = |lane: usize| shifted[MAX_WIDTH - k + lane];
-        let low = f32x4::new([at(0), at(1), at(2), at(3)]);
-        (low, f32x4::new([at(4), at(5), at(6), at(7)]))
-    };
-    let mut least = [f32x4::splat(f32::INFINITY); 2];
-    for (k, &left) in (1..W).zip(left) {
-        let (low, high) = row(k);
-        let left = f32x4::splat(left);
-        least[0] = least[0].fast_min(low + left);
-        least[1] = least[1].fast_min(high + left);
-    }
-    let [[a, b, c, d], [e, f, g, h]] = [least[0].to_array(), least[1].to_array()];
-    [a, b, c, d, e, f, g, h]
 }
 
 struct Solver<'a, const W: usize, I> {
@@ -212,13 +134,13 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
             slices.push((task.start, slice));
             (rest, passed) = (after, task.end);
         }
-        let solve = |(start, slice): (usize, &mut [Entry])| {
-            for node in (0..slice.len()).rev() {
-                slice[node] = self.solve(start + node, slice, start);
-                if node % STRIDE == 0 {
-                    watch.advance(STRIDE);
-                }
-            }
+        let solve = |(start, entries): (usize, &mut [Entry])| {
+            self.backend.run(SolveTask {
+                solver: self,
+                start,
+                entries,
+                watch,
+            });
         };
         #[cfg(feature = "rayon")]
         {
@@ -228,16 +150,11 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         #[cfg(not(feature = "rayon"))]
         slices.into_iter().for_each(solve);
 
-        let mut tasks = tasks;
-        let mut node = entries.len();
-        while node > 0 {
-            if let Some(task) = tasks.pop_if(|task| task.end == node) {
-                node = task.start;
-                continue;
-            }
-            node -= 1;
-            entries[node] = self.solve(node, entries, 0);
-        }
+        self.backend.run(SolveRest {
+            solver: self,
+            tasks,
+            entries,
+        });
     }
 
     /// What is below the largest subtrees of up to [`TASK_NODES`] nodes, as ranges from left to right.
@@ -267,12 +184,13 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
 
     /// One node; those below it are in `entries`, of which the first is that of node `start`.
     #[inline(always)]
-    fn solve(&self, node: usize, entries: &[Entry], start: usize) -> Entry {
+    fn solve<S: Simd>(&self, token: S, node: usize, entries: &[Entry], start: usize) -> Entry {
         let BinaryNode { aabb, first, count } = self.nodes[node];
         let area = self.measure.half_area(&aabb);
         if self.nodes[node].is_leaf() {
             return Entry {
-                forest: [area * I::leaf_cost(count as usize); _],
+                forest: [area * I::leaf_cost(count as usize); MAX_WIDTH],
+                cuts: Cuts::NONE,
                 first,
                 count: count as u8,
                 fits: true,
@@ -282,9 +200,9 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
 
         let [left, right] = self.nodes[node].children();
         let (left, right) = (&entries[left - start], &entries[right - start]);
-        let mut forest = forest::<W>(&left.forest, &right.forest);
+        let joined = Joined::new::<W>(token, &left.forest, &right.forest);
         // The least of W roots, under one node.
-        forest[0] = forest[W - 1] + area * cost::NODE;
+        let mut one = joined.most::<W>() + area * cost::NODE;
 
         let first = left.first;
         let count = left.count.saturating_add(right.count);
@@ -298,18 +216,76 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         let mut is_leaf = false;
         if fits {
             let leaf = area * I::leaf_cost(count as usize);
-            is_leaf = leaf <= forest[0];
+            is_leaf = leaf <= one;
             if is_leaf {
-                forest[0] = leaf;
+                one = leaf;
             }
         }
-        least_so_far::<W>(&mut forest);
+        let (forest, cuts) = joined.below::<W>(token, one);
         Entry {
             forest,
+            cuts,
             first,
             count,
             fits,
             is_leaf,
+        }
+    }
+}
+
+/// The nodes from number `start` on, all of which lead to one another alone.
+struct SolveTask<'s, 'a, const W: usize, I> {
+    solver: &'s Solver<'a, W, I>,
+    start: usize,
+    entries: &'s mut [Entry],
+    watch: &'s Watch<'s>,
+}
+
+impl<const W: usize, I: Input> Operation for SolveTask<'_, '_, W, I> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) {
+        let Self {
+            solver,
+            start,
+            entries,
+            watch,
+        } = self;
+        for node in (0..entries.len()).rev() {
+            entries[node] = solver.solve(token, start + node, entries, start);
+            if node % STRIDE == 0 {
+                watch.advance(STRIDE);
+            }
+        }
+    }
+}
+
+/// All but the tasks, which are solved.
+struct SolveRest<'s, 'a, const W: usize, I> {
+    solver: &'s Solver<'a, W, I>,
+    tasks: Vec<Range<usize>>,
+    entries: &'s mut [Entry],
+}
+
+impl<const W: usize, I: Input> Operation for SolveRest<'_, '_, W, I> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) {
+        let Self {
+            solver,
+            mut tasks,
+            entries,
+        } = self;
+        let mut node = entries.len();
+        while node > 0 {
+            if let Some(task) = tasks.pop_if(|task| task.end == node) {
+                node = task.start;
+                continue;
+            }
+            node -= 1;
+            entries[node] = solver.solve(token, node, entries, 0);
         }
     }
 }

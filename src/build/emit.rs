@@ -5,6 +5,7 @@ use super::{
     binary::BinaryTree,
     collapse::Collapse,
     cost::Measure,
+    cuts::Cuts,
     input::{Input, leaf_of},
     monitor::Watch,
 };
@@ -34,8 +35,39 @@ pub(super) trait Shape<const W: usize> {
     fn aabb(&self, node: usize) -> &Aabb;
     /// Whether a node becomes a leaf.
     fn is_leaf(&self, node: usize) -> bool;
-    /// The children of a node that becomes a wide one, and how many.
-    fn children(&self, node: usize) -> ([usize; W], usize);
+    /// The two children of a binary node.
+    fn below(&self, node: usize) -> [usize; 2];
+    /// How the cheapest forests below a node are made.
+    fn cuts(&self, node: usize) -> Cuts;
+
+    /// The children of a node that becomes a wide one, in the binary tree's order, and how many.
+    #[inline(always)]
+    fn children(&self, node: usize) -> ([usize; W], usize) {
+        let (mut children, mut count) = ([0; W], 0);
+        // Forests still to be taken apart, and how many roots each may have: never more than W in all.
+        let mut todo = [(0, 0); W];
+        let cut = |node: usize, roots: usize| {
+            let [left, right] = self.below(node);
+            let lefts = self.cuts(node).left(roots);
+            [(right, roots - lefts), (left, lefts)]
+        };
+        [todo[0], todo[1]] = cut(node, W);
+        let mut len = 2;
+        while len > 0 {
+            len -= 1;
+            let (node, roots) = todo[len];
+            let roots = self.cuts(node).fewest(roots);
+            if roots == 1 {
+                children[count] = node;
+                count += 1;
+            } else {
+                [todo[len], todo[len + 1]] = cut(node, roots);
+                len += 2;
+            }
+        }
+        (children, count)
+    }
+
     /// Has fetched what [`children`](Self::children) of a node is going to read.
     #[inline(always)]
     fn fetch<S: Simd>(&self, _token: S, _node: usize) {}

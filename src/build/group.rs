@@ -6,8 +6,9 @@
 use super::{
     BuildError,
     binary::{BinaryNode, BinaryTree},
-    collapse::{Collapse, MAX_WIDTH},
+    collapse::Collapse,
     cost::Measure,
+    cuts::MAX_WIDTH,
     emit::Shape,
     input::{Input, leaf_of},
     lay_out::{Part, below_inner, lay_out},

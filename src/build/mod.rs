@@ -4,7 +4,7 @@
 //! 2. `spatial`, for large triangles, some of which become `pieces`, by `clip`; then `binned`, by `split` and
 //!    `sweep`: the binary tree, from the top down. Or `adopt`: a caller's.
 //! 3. `reinsertion`: subtrees are moved to where they cost least.
-//! 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`.
+//! 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`; `cuts`, how.
 //! 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
 //! 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
 //!
@@ -28,6 +28,7 @@ mod clip;
 mod collapse;
 mod compact;
 mod cost;
+mod cuts;
 mod emit;
 mod error;
 mod fast;
