@@ -2,8 +2,8 @@
 
 use crate::{
     geometry::{Aabb, Ray},
-    simd::{Portable, splat3},
-    slab::{PreparedRay, primitive_interval, reciprocal},
+    simd::Portable,
+    slab::{PreparedRay, primitive_interval},
 };
 
 /// Primitives that the caller keeps and intersects: spheres, curves, voxels, whole objects.
@@ -54,9 +54,8 @@ pub(crate) fn intersect<P: Primitives + ?Sized>(
     let relative = |bound: [f32; 3]| {
         [0, 1, 2].map(|axis| wide::f32x4::splat(bound[axis] - prepared.ray.origin[axis]))
     };
-    let direction: [wide::f32x4; 3] = splat3(Portable, prepared.ray.direction.to_array());
-    let reciprocal = direction.map(|d| reciprocal(Portable, d));
-    let interval = primitive_interval(Portable, reciprocal, relative(lo), relative(hi));
+    let reciprocals = prepared.reciprocals(Portable);
+    let interval = primitive_interval(Portable, reciprocals, relative(lo), relative(hi));
     let (near, far) = (interval.0.to_array()[0], interval.1.to_array()[0]);
     if !(near <= far && near <= prepared.ray.t_max && prepared.ray.t_min <= far) {
         return None;

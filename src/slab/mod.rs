@@ -72,7 +72,7 @@ mod prepared;
 pub use bundle::BundleSlabs;
 pub(crate) use bundle::{Bundling, most};
 pub use narrow::NarrowRay;
-pub(crate) use prepared::{PreparedRay, pow2, reciprocal, unscaled};
+pub(crate) use prepared::{PreparedRay, pow2, reciprocals, unscaled};
 
 use crate::{
     geometry::{Aabb, Ray},

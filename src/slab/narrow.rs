@@ -23,20 +23,8 @@ pub struct NarrowRay {
 }
 
 impl NarrowRay {
-    /// Of no meaning.
-    pub(crate) const NONE: Self = Self {
-        reciprocal: [0.0; 3],
-        near: [0.0; 3],
-        far: [0.0; 3],
-        t_min: 0.0,
-        margin: 0.0,
-        first: [0; 3],
-        along: 0.0,
-        axes: 0,
-    };
-
-    /// Eight rays, for boxes within `bounds` in nodes of `width` children, and a bit for each that is [ordinary]
-    /// (PreparedLanes::ordinary) and not too far away. The others are of no meaning.
+    /// Eight rays, for boxes within `bounds` in nodes of `width` children, and a bit for each that is
+    /// [ordinary](PreparedLanes) and not too far away. The others are of no meaning.
     #[inline(always)]
     pub(crate) fn eight<T: Simd>(
         token: T,
@@ -71,7 +59,7 @@ impl NarrowRay {
         let ([nx, ny, nz], [fx, fy, fz]) = (slabs.near, slabs.far);
         let starts = token.transpose([rx, ry, rz, nx, ny, nz, fx, fy]);
         let ends = token.transpose([fz, slabs.t_min, slabs.margin, x, y, z, along, axes]);
-        let mut rays = [Self::NONE; 8];
+        let mut rays = [Self::zeroed(); 8];
         for ((ray, start), end) in rays.iter_mut().zip(starts).zip(ends) {
             let [a, b]: &mut [[f32; 8]; 2] = bytemuck::cast_mut(ray);
             (*a, *b) = (start.to_array(), end.to_array());

@@ -35,10 +35,23 @@ const MAX_RECIPROCAL: f32 = pow2(48);
 
 /// 1 / direction, a component, no greater in magnitude than [`MAX_RECIPROCAL`].
 #[inline(always)]
-pub(crate) fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
+fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
     (V::splat(token, 1.0) / direction)
         .max(V::splat(token, -MAX_RECIPROCAL))
         .min(V::splat(token, MAX_RECIPROCAL))
+}
+
+/// Those of a direction's components.
+#[inline(always)]
+pub(crate) fn reciprocals<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    [x, y, z]: [V; 3],
+) -> [V; 3] {
+    [
+        reciprocal(token, x),
+        reciprocal(token, y),
+        reciprocal(token, z),
+    ]
 }
 
 impl<'a> PreparedRay<'a> {
@@ -121,12 +134,7 @@ impl<'a> PreparedRay<'a> {
     /// The reciprocals of the direction, by axis.
     #[inline(always)]
     pub(crate) fn reciprocals<const N: usize, V: Vector<N>>(&self, token: V::Token) -> [V; 3] {
-        let [x, y, z]: [V; 3] = splat3(token, self.ray.direction.to_array());
-        [
-            reciprocal(token, x),
-            reciprocal(token, y),
-            reciprocal(token, z),
-        ]
+        reciprocals(token, splat3(token, self.ray.direction.to_array()))
     }
 
     /// What an accepted `t` is to be multiplied by for [`unscaled`](Self::unscaled).
@@ -173,11 +181,7 @@ impl<V> PreparedLanes<V> {
         V: Vector<N>,
     {
         let [dx, dy, dz] = direction;
-        let [rx, ry, rz] = [
-            reciprocal(token, dx),
-            reciprocal(token, dy),
-            reciprocal(token, dz),
-        ];
+        let [rx, ry, rz] = reciprocals(token, direction);
         let largest = dx.abs().max(dy.abs()).max(dz.abs());
         let (not_x, not_y) = (dx.abs().lt(largest), dy.abs().lt(largest));
         let number = |bits| V::splat(token, f32::from_bits(bits));
@@ -273,13 +277,13 @@ static SHEAR_AXES: [[usize; 3]; 8] = [
 
 /// The greater of two numbers, neither of them NaN.
 #[inline(always)]
-pub(crate) fn greater(a: f32, b: f32) -> f32 {
+fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// The lesser of two numbers, neither of them NaN.
 #[inline(always)]
-pub(crate) fn lesser(a: f32, b: f32) -> f32 {
+fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 

@@ -13,7 +13,7 @@ use crate::{
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Along, RayShear, Sheared, bits},
     simd::{Lanes, Simd, Vector, load_all, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocal},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocals},
 };
 use core::mem::MaybeUninit;
 
@@ -126,7 +126,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
                     v: v[lane],
                     place: places[lane].to_bits() as usize,
                 };
-                Q::answer(found, ray, 1.0, bvh.primitives())
+                Q::answer(found, ray, bvh.primitives())
             };
         }
     }
@@ -336,11 +336,7 @@ impl<T: Simd> Packet<T> {
         if !like.is_like(token, origin, direction, [t_min, t_max]) {
             return None;
         }
-        let reciprocals = [
-            reciprocal(token, dx),
-            reciprocal(token, dy),
-            reciprocal(token, dz),
-        ];
+        let reciprocals = reciprocals(token, direction);
         let signs = like.ray.direction;
         let (slabs, extent) = RaySlabs::of_lanes(token, origin, reciprocals, t_min, signs, bounds);
         let [kx, ky, kz] = *like.axes;

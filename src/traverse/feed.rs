@@ -11,6 +11,7 @@ use crate::{
     simd::{Operation, Simd, load_all},
     slab::NarrowRay,
 };
+use bytemuck::Zeroable;
 
 /// The most runs of 64 rays.
 pub(super) const GROUPS: usize = 256;
@@ -55,7 +56,7 @@ impl<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Feed<'a, N, L, S,
             waiting,
             group: 0,
             left: waiting[0],
-            ready: [NarrowRay::NONE; READY],
+            ready: [NarrowRay::zeroed(); READY],
             indices: [0; READY],
             to_start: 0,
         }
@@ -82,7 +83,7 @@ impl<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Feed<'a, N, L, S,
         if let (Some(ray), Some(answer)) = (self.rays.get(index), self.answers.get_mut(index)) {
             *answer = match found {
                 None => Q::MISS,
-                Some(found) => Q::answer(found, ray, 1.0, self.bvh.primitives()),
+                Some(found) => Q::answer(found, ray, self.bvh.primitives()),
             };
         }
     }

@@ -10,8 +10,8 @@ pub(super) trait Query {
     /// Whether the closest hit is wanted: else the first that is met will do.
     const CLOSEST: bool;
 
-    /// Of what was found for a ray. `unscale` is that of the prepared ray.
-    fn answer(found: Found, ray: &Ray, unscale: f32, primitives: &[u32]) -> Self::Answer;
+    /// Of what was found for a ray that was not scaled.
+    fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Self::Answer;
 }
 
 /// The closest hit.
@@ -26,8 +26,8 @@ impl Query for ClosestHit {
     const CLOSEST: bool = true;
 
     #[inline(always)]
-    fn answer(found: Found, ray: &Ray, unscale: f32, primitives: &[u32]) -> Option<Hit> {
-        Some(found.hit(ray, unscale, primitives))
+    fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Option<Hit> {
+        Some(found.hit(ray, 1.0, primitives))
     }
 }
 
@@ -37,7 +37,7 @@ impl Query for AnyHit {
     const CLOSEST: bool = false;
 
     #[inline(always)]
-    fn answer(_: Found, _: &Ray, _: f32, _: &[u32]) -> bool {
+    fn answer(_: Found, _: &Ray, _: &[u32]) -> bool {
         true
     }
 }
