@@ -9,13 +9,13 @@ use super::{
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Child, Storage, TriangleLeaves, WideNode},
+    layout::{Bvh, Storage, TriangleLeaves, WideNode},
     simd::{Operation, Simd},
 };
 use core::{fmt, mem::MaybeUninit};
 
 /// Rays under way at a time where the memory is ours to choose.
-const LANES: usize = 48;
+const LANES: usize = 32;
 
 /// As many rays are sorted out before those left over are interleaved.
 const WINDOW: usize = feed::GROUPS * bundle::RAYS;
@@ -51,7 +51,7 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
 /// the tree side by side; others are interleaved. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes 150 KiB of stack.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         self.backend().run(Batch::<N, L, S, ClosestHit> {
             bvh: self,
@@ -61,7 +61,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 150 KiB of stack.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
@@ -184,10 +184,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
     fn run<T: Simd>(self, token: T) {
         let bvh = self.bvh;
         let (rays, answers) = paired(self.rays, self.answers);
-        if self.bvh.root() == Child::EMPTY {
-            answers.fill(Q::MISS);
-            return;
-        }
         let Scratch(mut lanes) = Scratch::<LANES>::new();
         let mut patience = Patience::default();
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
@@ -222,10 +218,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> O
     #[inline(always)]
     fn run<T: Simd>(self, token: T) {
         let (rays, answers) = paired(self.rays, self.answers);
-        if self.bvh.root() == Child::EMPTY {
-            answers.fill(Q::MISS);
-            return;
-        }
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
             let all = [u64::MAX; feed::GROUPS];
             let mut feed = Feed::<N, L, S, Q>::new(self.bvh, rays, answers, &all, self.one);
