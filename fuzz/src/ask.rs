@@ -60,8 +60,28 @@ pub(crate) fn ask<N: WideNode>(
         add("packets of 4", packets::<N, 4>(&bvh, rays, active));
         add("packets of 8", packets::<N, 8>(&bvh, rays, active));
         add("packets of 64", packets::<N, 64>(&bvh, rays, active));
+        approximate(&bvh, rays);
     }
     answers
+}
+
+/// What is left of the contract where triangles are tested in `f32` alone: hits are in range and of the hierarchy's
+/// triangles, and there is any just when there is a closest, by every call.
+fn approximate<N: WideNode>(bvh: &Bvh<N, TriangleLeaf, Borrowed>, rays: &[Ray]) {
+    let bvh = bvh.approximate();
+    let (closest, any) = singles(&bvh, rays);
+    let (batched, batched_any) = batch(&bvh, rays);
+    for (place, ray) in rays.iter().enumerate() {
+        let hits = [closest[place], batched[place]];
+        for hit in hits.into_iter().flatten() {
+            assert!(ray.t_min <= hit.t && hit.t <= ray.t_max, "{hit:?}, {ray:?}");
+            assert!(hit.t.is_finite());
+            assert!(bvh.primitives().contains(&hit.primitive));
+        }
+        let found = hits.map(|hit| hit.is_some());
+        let all = [any[place], batched_any[place], found[0], found[1]];
+        assert!(all == [all[0]; 4], "{all:?} of {ray:?}");
+    }
 }
 
 fn singles<N: WideNode, L: TriangleLeaves>(
@@ -80,8 +100,8 @@ fn counted<N: WideNode, L: TriangleLeaves>(
     rays.iter().map(answer).unzip()
 }
 
-fn batch<N: WideNode>(
-    bvh: &Bvh<N, TriangleLeaf, Borrowed>,
+fn batch<N: WideNode, L: TriangleLeaves>(
+    bvh: &Bvh<N, L, Borrowed>,
     rays: &[Ray],
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (mut hits, mut occluded) = unanswered(rays);

@@ -137,6 +137,27 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     }
 }
 
+/// How many children of `nodes`, all within `bounds`, a bundle of the rays may pass the boxes of, if there is such a bundle.
+#[inline(always)]
+pub(super) fn count_boxes<T: Simd, N: WideNode>(
+    token: T,
+    nodes: &[N],
+    bounds: &Aabb,
+    rays: &[Ray],
+) -> Option<u32> {
+    if rays.len() > RAYS {
+        return None;
+    }
+    let bundle = Bundle::<T>::new(token, bounds, rays)?;
+    let far = N::Lanes::<T>::splat(token, bundle.far);
+    let mut passed = 0;
+    for node in nodes {
+        let (hit, _) = node.test_bundle(token, &bundle.slabs, far);
+        passed += hit.bits().count_ones();
+    }
+    Some(passed)
+}
+
 impl<'a, T: Simd> Bundle<'a, T> {
     /// `None` if the rays are not alike, or one of them is out of the ordinary, or all is too far away.
     #[inline(always)]

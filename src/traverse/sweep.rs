@@ -2,6 +2,7 @@
 //!
 //! For a handful of boxes or triangles that need no tree, and to measure how fast the tests are by themselves.
 
+use super::bundle;
 use crate::{
     geometry::{Aabb, Ray},
     layout::{TriangleLeaf, Triangles, WideNode},
@@ -33,6 +34,25 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
         }
     }
     backend.run(Boxes(nodes, bounds, ray))
+}
+
+/// How many children of `nodes`, all within `bounds`, up to 64 rays pass the boxes of, tested all at once as a batch tests
+/// rays that are alike: at least those that any of them passes the boxes of. `None` if they are not alike.
+pub fn count_boxes_of_bundle<N: WideNode>(
+    backend: Backend,
+    nodes: &[N],
+    bounds: &Aabb,
+    rays: &[Ray],
+) -> Option<u32> {
+    struct Boxes<'a, N>(&'a [N], &'a Aabb, &'a [Ray]);
+    impl<N: WideNode> Operation for Boxes<'_, N> {
+        type Output = Option<u32>;
+        #[inline(always)]
+        fn run<T: Simd>(self, token: T) -> Option<u32> {
+            bundle::count_boxes(token, self.0, self.1, self.2)
+        }
+    }
+    backend.run(Boxes(nodes, bounds, rays))
 }
 
 /// How many triangles of `leaves` the ray hits within its range.

@@ -20,6 +20,9 @@
 //!    place along z, D being the largest of |scene bound| + |o| on any axis; and it still does where the range of t ends, or
 //!    begins, 64·uD / |d.z| from there. That is what the proof in `src/slab` has of the triangle test, and uses up what
 //!    roundings of the box test itself leave of its margins: they are no larger than they have to be for it.
+//! 9. The test of a bundle, of this ray and one whose origin, which planes are taken from, is on the other side of the
+//!    scene, passes such a box, too; and one within 12uD, for its margin has more room for roundings than they take
+//!    where no reciprocal is cut off.
 //!
 //! 1 to 3 leave no room: which triangles are hit is decided by rounding within δ of an edge alone, and
 //! then as the rounded corners say. Where scenes are beyond 2^76 the crate promises less, and nothing is checked.
@@ -36,7 +39,7 @@ use wide_bvh::{
     layout::{Child, Node4, Node8, WideNode},
     reference,
     simd::Backend,
-    traverse::sweep::count_boxes,
+    traverse::sweep::{count_boxes, count_boxes_of_bundle},
 };
 
 /// The unit roundoff.
@@ -49,6 +52,10 @@ pub const K_SHEAR: f32 = 7.0;
 pub const K_T: f32 = 66.0;
 /// What claim 8 uses of that: the rest is for the box test's own roundings.
 const K_T_USED: f32 = 64.0;
+/// What claim 9 uses of the bundle's margin of 24, of which roundings take less than 12.
+const K_BUNDLE_USED: f32 = 12.0;
+/// Directions' components are not cut off from here.
+const MIN_DIRECTION: f32 = 1.0 / (1_u64 << 47) as f32;
 
 /// What brute force says of a triangle by itself, whatever t.
 ///
@@ -100,7 +107,7 @@ pub fn check(ray: &Ray, corners: [Vec3; 3]) -> Result<Option<Hit>, String> {
         claims.t(hit, weights, defined.as_ref())?;
         claims.uv(hit, weights)?;
         claims.least_box(hit, weights)?;
-        claims.box_beside(hit, weights)?;
+        claims.boxes_beside(hit, weights)?;
     }
     claims.own_box()?;
     Ok(hit)
@@ -304,37 +311,17 @@ impl Claims<'_> {
             })
     }
 
-    /// Claim 8, for a box of one point that is met as late as it may be along one axis, and left as early along the
-    /// other; which, and how t is bounded, is as the hit's last bits have it.
-    fn box_beside(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
+    /// Claims 8 and 9, for boxes of one point each.
+    fn boxes_beside(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
         let (scene, origin) = (Aabb::from_points(self.corners), self.ray.origin);
         let extent = (scene.min.abs().max(scene.max.abs()) + origin.abs()).max_element();
         let scaled = self.sheared.scale != 1.0;
         if scaled || !(1e-15..1e15).contains(&extent) {
             return Ok(());
         }
+        let choice = (hit.t.to_bits() ^ hit.u.to_bits()) as usize;
         let t_star = self.t_star(weights);
         let extent = exact(extent.next_down());
-        let beside = exact(K_SHEAR) * exact(U) * &extent;
-        let choice = (hit.t.to_bits() ^ hit.u.to_bits()) as usize;
-        let [x, y, z] = self.sheared.axes;
-        let [late, soon] = [[x, y], [y, x]][choice % 2];
-        let mut aabb = Aabb::EMPTY;
-        for (axis, sign) in [(late, 1.0), (soon, -1.0), (z, 0.0)] {
-            let place = &self.exact_origin[axis] + &self.exact_direction[axis] * &t_star;
-            let sign = sign * self.ray.direction[axis].signum();
-            let (low, high) = between_floats(&(&place + exact(sign) * &beside));
-            // Beside the ray, the float on its side.
-            (aabb.min[axis], aabb.max[axis]) = match sign {
-                1.0 => (low, low),
-                -1.0 => (high, high),
-                _ => (low, high),
-            };
-            if sign != 0.0 && abs(&(exact(aabb.min[axis]) - place)) > beside {
-                // Floats are too far apart.
-                return Ok(());
-            }
-        }
         let early = exact(K_T_USED) * exact(U) * &extent / self.length();
         let infinity = f32::INFINITY;
         let (t_min, t_max) = match choice / 2 % 3 {
@@ -342,11 +329,43 @@ impl Claims<'_> {
             1 => (-infinity, between_floats(&(&t_star - early)).1),
             _ => (between_floats(&(&t_star + early)).0, infinity),
         };
-        self.passes(&aabb, &aabb, &self.ray.with_range(t_min, t_max))
-            .map_err(|backend| {
-                let Aabb { min, max } = aabb;
-                format!("claim 8: {min}, {max} from {t_min} to {t_max} is lost by {backend}")
-            })
+        let ray = self.ray.with_range(t_min, t_max);
+        let unit = exact(U) * extent;
+        let lost = |claim, Aabb { min, max }, by| {
+            format!("claim {claim}: {min}, {max} from {t_min} to {t_max} is lost by {by}")
+        };
+        if let Some(aabb) = self.box_beside(&t_star, &(exact(K_SHEAR) * &unit), choice) {
+            self.passes(&aabb, &aabb, &ray)
+                .map_err(|backend| lost(8, aabb, backend))?;
+        }
+        if let Some(aabb) = self.box_beside(&t_star, &(exact(K_BUNDLE_USED) * &unit), choice) {
+            self.bundle_passes(&aabb, &ray)
+                .map_err(|backend| lost(9, aabb, backend))?;
+        }
+        Ok(())
+    }
+
+    /// A box of one point that is met as late along one axis, for being so far beside the ray, as it is left early along
+    /// the other; `choice` says which. `None` where floats are too far apart.
+    fn box_beside(&self, t: &Number, beside: &Number, choice: usize) -> Option<Aabb> {
+        let [x, y, z] = self.sheared.axes;
+        let [late, soon] = [[x, y], [y, x]][choice % 2];
+        let mut aabb = Aabb::EMPTY;
+        for (axis, sign) in [(late, 1.0), (soon, -1.0), (z, 0.0)] {
+            let place = &self.exact_origin[axis] + &self.exact_direction[axis] * t;
+            let sign = sign * self.ray.direction[axis].signum();
+            let (low, high) = between_floats(&(&place + exact(sign) * beside));
+            // Beside the ray, the float on its side.
+            (aabb.min[axis], aabb.max[axis]) = match sign {
+                1.0 => (low, low),
+                -1.0 => (high, high),
+                _ => (low, high),
+            };
+            if sign != 0.0 && abs(&(exact(aabb.min[axis]) - place)) > *beside {
+                return None;
+            }
+        }
+        Some(aabb)
     }
 
     /// Whether every box test passes `aabb` in a scene of this triangle and `more`; else which does not.
@@ -360,6 +379,25 @@ impl Claims<'_> {
                 if passed != 1 {
                     return Err(format!("{width}-wide, {}", backend.name()));
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// The same of the test of a bundle, in a scene of this triangle and the box.
+    fn bundle_passes(&self, aabb: &Aabb, ray: &Ray) -> Result<(), String> {
+        if ray.direction.abs().min_element() < MIN_DIRECTION {
+            return Ok(());
+        }
+        let scene = Aabb::from_points(self.corners).join(*aabb);
+        let mut first = *ray;
+        first.origin = -ray.origin;
+        let node = Node8::from_children([(*aabb, Child::leaf(0))]);
+        for backend in Backend::available() {
+            let rays = [first, *ray];
+            let passed = count_boxes_of_bundle(backend, &[node], &scene, &rays);
+            if passed == Some(0) {
+                return Err(format!("a bundle, {}", backend.name()));
             }
         }
         Ok(())
