@@ -32,7 +32,7 @@ fn rays(mesh: &Mesh, rng: &mut Rng) -> Vec<Ray> {
     while rays.len() < 1500 {
         let count = rng.usize(1..200);
         let eye = point(rng) * 3.0;
-        match rng.u32(0..7) {
+        match rng.u32(0..8) {
             // A camera's, next to one another; some straight at vertices.
             0 | 1 => {
                 let (target, width) = (vertex(mesh, rng), rng.f32() * 0.5);
@@ -67,6 +67,14 @@ fn rays(mesh: &Mesh, rng: &mut Rng) -> Vec<Ray> {
                 }));
             }
             5 => rays.extend((0..count).map(|_| Ray::new(point(rng), point(rng)))),
+            // Alike in direction, from anywhere: bundles that are given up.
+            6 => {
+                let direction = point(rng);
+                rays.extend((0..count).map(|_| {
+                    let nudged = direction + point(rng) * 0.2 * direction.length();
+                    Ray::new(point(rng) * 4.0, nudged)
+                }));
+            }
             // Any bits.
             _ => rays.extend((0..count).map(|_| {
                 let mut any = || f32::from_bits(rng.u32(..));

@@ -252,7 +252,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Op
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
         let outcome = bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, &mut found[..count]);
-        if outcome == bundle::Outcome::Unlike {
+        if !outcome.is_traced() {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = (self.one)(self.bvh, ray);
             }

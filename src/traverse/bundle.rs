@@ -27,9 +27,13 @@ const FEW: u32 = 2;
 /// How far apart the rays of a bundle may go, across for one along their largest component.
 const SPREAD: f32 = 0.5;
 
-/// A bundle is loose from so many tests of packets against boxes a ray on. Waves are faster where there are 13 (dragon's
-/// shadow rays), bundles where there are 4.
-const LOOSE: usize = 8;
+/// A bundle is loose if fewer rays, in eighths, pass a box for each test of a packet: of the eight that are tested at once
+/// hardly one goes on. Waves are faster then.
+const LEAST_PASSES: usize = 9;
+/// From so many tests a ray on a loose bundle is given up: before, it cannot be told.
+const TRIED: usize = 1;
+/// From so many on it is not: most is done.
+const DONE: usize = 4;
 
 /// A number of each ray of a packet.
 type V<T> = <T as Simd>::F32x8;
@@ -66,6 +70,8 @@ struct Bundle<'a, T: Simd> {
     found: u64,
     /// How many boxes packets were tested against.
     tests: usize,
+    /// How many boxes of those each ray passed, in all.
+    passes: usize,
 }
 
 /// A child to go to, for some of the rays.
@@ -84,10 +90,19 @@ struct Entry {
 pub(super) enum Outcome {
     /// The rays are not alike: nothing was done.
     Unlike,
-    /// The rays are traced, though their ways parted so soon that each by itself had been as fast.
+    /// Their ways part so soon that each by itself is as fast: nothing has come of it.
+    GivenUp,
+    /// The same, but all are traced.
     Loose,
     /// The rays are traced.
     Tight,
+}
+
+impl Outcome {
+    /// Whether all answers are there.
+    pub(super) fn is_traced(self) -> bool {
+        matches!(self, Self::Loose | Self::Tight)
+    }
 }
 
 /// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike.
@@ -104,7 +119,9 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
         return Outcome::Unlike;
     };
-    bundle.walk::<N, L, S, Q>(token, bvh);
+    if !bundle.walk::<N, L, S, Q>(token, bvh) {
+        return Outcome::GivenUp;
+    }
     let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
     for (index, (rays, answers)) in packets.enumerate() {
         let found = bundle.found >> (LANES * index);
@@ -130,7 +147,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             };
         }
     }
-    if bundle.tests > LOOSE * rays.len() {
+    if bundle.is_loose() {
         Outcome::Loose
     } else {
         Outcome::Tight
@@ -203,6 +220,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             looking: u64::MAX >> (RAYS - rays.len().min(RAYS)),
             found: 0,
             tests: 0,
+            passes: 0,
         })
     }
 
@@ -213,15 +231,21 @@ impl<'a, T: Simd> Bundle<'a, T> {
         unsafe { self.packets.get_unchecked_mut(index).assume_init_mut() }
     }
 
-    /// Finds what all rays find.
+    #[inline(always)]
+    fn is_loose(&self) -> bool {
+        8 * self.passes < LEAST_PASSES * self.tests
+    }
+
+    /// Finds what all rays find, unless that is given up.
     #[inline(always)]
     fn walk<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
         token: T,
         bvh: &Bvh<N, L, S>,
-    ) {
+    ) -> bool {
         let nodes = bvh.nodes().as_ptr();
         let direction = self.rays[0].direction;
+        let given_up_at = TRIED * self.rays.len()..DONE * self.rays.len();
         let mut stack = [MaybeUninit::<Entry>::uninit(); STACK];
         let mut len = 0;
         let mut current = Link::new::<N>(bvh.root());
@@ -265,7 +289,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             // The last child left behind that any of its rays passes, with as near as they have come.
             loop {
                 if len == 0 {
-                    return;
+                    return true;
                 }
                 len -= 1;
                 // SAFETY: those below the length were written.
@@ -278,6 +302,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
                     let [near, far] = parent.child_planes(entry.lane as usize, direction);
                     rays = self.passing(token, near, far, rays);
                     if rays != 0 {
+                        if given_up_at.contains(&self.tests) && self.is_loose() {
+                            return false;
+                        }
                         break;
                     }
                 }
@@ -297,8 +324,10 @@ impl<'a, T: Simd> Bundle<'a, T> {
             tests += 1;
             passing |= u64::from(hit.bits()) << (LANES * index);
         }
+        passing &= rays;
         self.tests += tests;
-        passing & rays
+        self.passes += passing.count_ones() as usize;
+        passing
     }
 
     /// Tests the leaf's triangles for some of the rays.

@@ -77,7 +77,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     }
     let (mut class, mut classes) = (all, None);
     let (mut left, mut waiting) = (all, 0);
-    let mut any_alike = false;
+    let (mut any_tight, mut any_loose) = (false, false);
     let mut gathered = [PreparedRay::ROOM; bundle::RAYS];
     let mut found = [Q::MISS; bundle::RAYS];
     loop {
@@ -92,11 +92,11 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             (&gathered[..count], &mut found[..count])
         };
         let outcome = bundle::trace::<T, N, L, S, Q>(token, bvh, part, out);
-        let alike = outcome != Outcome::Unlike;
+        let (alike, tight) = (outcome != Outcome::Unlike, outcome == Outcome::Tight);
         if whole {
             if alike {
-                patience.loose.note(outcome == Outcome::Tight);
-                return 0;
+                patience.loose.note(tight);
+                return if outcome.is_traced() { 0 } else { all };
             }
             if patience.unlike.is_out() {
                 return all;
@@ -104,8 +104,9 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             classes = Some(Classes::new(token, rays));
         } else {
             left &= !class;
-            if alike {
-                any_alike = true;
+            any_tight |= tight;
+            any_loose |= alike && !tight;
+            if outcome.is_traced() {
                 for (&answer, place) in found.iter().zip(places(class)) {
                     answers[place] = answer;
                 }
@@ -119,7 +120,10 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
                 return left | waiting;
             };
             if left.count_ones() < LEAST {
-                patience.unlike.note(any_alike);
+                patience.unlike.note(any_tight);
+                if any_tight || any_loose {
+                    patience.loose.note(!any_loose);
+                }
                 return left | waiting;
             }
             class = classes.of_first(left);
