@@ -3,7 +3,7 @@
 //! anything in the way.
 //!
 //! ```
-//! use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}};
+//! use wide_bvh::{Builder, Ray, TriangleMesh};
 //!
 //! let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
 //! let indices = [[0, 1, 2_u32]];
@@ -22,14 +22,14 @@
 //!    of least `t`, of equal ones the one of least number. The tree, its width, the processor, the number of
 //!    threads that built it, and what other rays are asked about in the same call change nothing.
 //! 2. No ray slips through a closed mesh whose triangles share their vertices' positions.
-//! 3. Numbers that are no numbers are answers, not accidents: a ray that makes no sense hits nothing, and no
-//!    input to a safe function panics, hangs or reads out of bounds.
+//! 3. A ray with a NaN, an infinite origin or direction, a zero direction or an empty range is no error: it hits
+//!    nothing. No input to a safe function panics, hangs or reads out of bounds.
 //!
 //! # Where things are
 //!
 //! [`geometry`] has the boxes, rays, hits and meshes; [`build`] makes a hierarchy (with the feature `std`);
-//! [`layout`] says how it lies in memory; [`traverse`] documents the queries, which are methods of
-//! [`layout::Bvh`]; [`primitive`] is for a caller's own primitives; [`simd`] chooses the instructions.
+//! [`layout`] says how it lies in memory, and in [`layout::bytes`] in files; [`traverse`] lists the queries, which are
+//! methods of [`layout::Bvh`]; [`primitive`] is for a caller's own primitives; [`simd`] chooses the instructions.
 //!
 //! # Features
 //!
@@ -51,6 +51,14 @@ pub mod reference;
 pub mod simd;
 mod slab;
 pub mod traverse;
+
+pub use glam;
+
+#[cfg(feature = "std")]
+pub use build::{Builder, Preset};
+pub use geometry::{Aabb, Hit, Ray, TriangleMesh};
+#[cfg(feature = "alloc")]
+pub use layout::{Bvh4, Bvh8};
 
 /// The README's code, run as tests.
 #[cfg(all(doctest, feature = "std"))]

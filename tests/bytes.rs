@@ -251,11 +251,12 @@ fn cut_off() {
     );
 }
 
+fn error<'a, N: WideNode, L: Open<'a>>(bytes: &'a [u8]) -> Option<BytesError> {
+    Bvh::<N, L, Borrowed>::from_bytes(bytes).err()
+}
+
 #[test]
 fn what_is_wrong_is_said() {
-    fn error<'a, N: WideNode, L: Open<'a>>(bytes: &'a [u8]) -> Option<BytesError> {
-        Bvh::<N, L, Borrowed>::from_bytes(bytes).err()
-    }
     let (scene, bytes) = small();
     let blocks = aligned(&bytes);
     let whole = bytes_of(&blocks, bytes.len());
@@ -305,12 +306,39 @@ fn what_is_wrong_is_said() {
         .unwrap()
         .to_bytes()
         .unwrap();
-    let blocks = aligned(&[&[0; 4], full.as_slice()].concat());
-    let shifted = &bytes_of(&blocks, full.len() + 4)[4..];
-    assert!(matches!(
-        error::<Node8, TriangleLeaf>(shifted),
-        Some(BytesError::Misaligned { needed: 32 | 64 })
-    ));
+    for shift in [1, 4, 32] {
+        let blocks = aligned(&[&[0; 64][..shift], full.as_slice()].concat());
+        let shifted = &bytes_of(&blocks, full.len() + shift)[shift..];
+        assert_eq!(
+            error::<Node8, TriangleLeaf>(shifted),
+            Some(BytesError::Misaligned { needed: 64 })
+        );
+    }
+}
+
+/// What a kind of hierarchy has none of, and what is kept for later, is 0.
+#[test]
+fn what_is_not_there_is_not_counted() {
+    let (scene, _) = small();
+    let full = Builder::new().build(&scene.mesh()).unwrap();
+    let runs: CompactBvh8 = Builder::new().build_compact(&scene.mesh()).unwrap();
+    let changed = |bytes: &[u8], place: usize| {
+        let mut bytes = bytes.to_vec();
+        bytes[place] ^= 1;
+        seal(&mut bytes);
+        bytes
+    };
+    let (full, runs) = (full.to_bytes().unwrap(), runs.to_bytes().unwrap());
+    for (place, field) in [(36, "positions"), (40, "triangles"), (127, "reserved")] {
+        let bytes = changed(&full, place);
+        let opened = error::<Node8, TriangleLeaf>(bytes_of(&aligned(&bytes), bytes.len()));
+        assert_eq!(opened, Some(BytesError::NotZero(field)));
+    }
+    for (place, field) in [(28, "leaves"), (76, "reserved")] {
+        let bytes = changed(&runs, place);
+        let opened = error::<CompactNode8, RunLeaf>(bytes_of(&aligned(&bytes), bytes.len()));
+        assert_eq!(opened, Some(BytesError::NotZero(field)));
+    }
 }
 
 /// A link has a node's place in units of 16 bytes: one that leads to the middle of a node is refused.

@@ -8,42 +8,48 @@ use proptest::prelude::*;
 use wide_bvh::{
     build::Builder,
     geometry::{Aabb, Ray},
-    layout::{Bvh, Node4, Node8, Owned, PrimitiveLeaf, WideNode},
+    layout::{Bvh, CompactNode4, CompactNode8, Node4, Node8},
     primitive::{Cuboids, Primitives, Sphere, Spheres},
     reference,
     simd::Backend,
 };
 
-fn check_width<N: WideNode, P: Primitives>(
-    primitives: &P,
-    count: u32,
-    rays: &[Ray],
-) -> Result<(), TestCaseError> {
-    let aabbs: Vec<Aabb> = (0..count).map(|i| primitives.aabb(i)).collect();
-    let mut bvh: Bvh<N, PrimitiveLeaf, Owned> = Builder::new().build_primitives(&aabbs).unwrap();
-    for backend in Backend::available() {
-        bvh.set_backend(backend);
-        for ray in rays {
-            let expected = reference::closest_primitive(primitives, count, ray);
-            let found = bvh.closest_hit(primitives, ray);
-            let bits = |hit: Option<(f32, u32)>| hit.map(|(t, id)| (t.to_bits(), id));
-            prop_assert_eq!(
-                bits(found.map(|hit| (hit.t, hit.primitive))),
-                bits(expected.map(|hit| (hit.t, hit.primitive))),
-                "{} wide, {:?}, {:?}",
-                N::WIDTH,
-                backend,
-                ray
-            );
-            prop_assert_eq!(bvh.any_hit(primitives, ray), expected.is_some());
+/// Holds a hierarchy to the reference: a macro, for those of different leaves share no trait of their queries.
+macro_rules! check_hierarchy {
+    ($built:expr, $name:expr, $primitives:expr, $count:expr, $rays:expr) => {
+        let mut bvh = $built.unwrap();
+        for backend in Backend::available() {
+            bvh.set_backend(backend);
+            for ray in $rays {
+                let expected = reference::closest_primitive($primitives, $count, ray);
+                let found = bvh.closest_hit($primitives, ray);
+                let bits = |hit: Option<(f32, u32)>| hit.map(|(t, id)| (t.to_bits(), id));
+                prop_assert_eq!(
+                    bits(found.map(|hit| (hit.t, hit.primitive))),
+                    bits(expected.map(|hit| (hit.t, hit.primitive))),
+                    "{}, {:?}, {:?}",
+                    $name,
+                    backend,
+                    ray
+                );
+                prop_assert_eq!(bvh.any_hit($primitives, ray), expected.is_some());
+            }
         }
-    }
-    Ok(())
+    };
 }
 
 fn check<P: Primitives>(primitives: &P, count: usize, rays: &[Ray]) -> Result<(), TestCaseError> {
-    check_width::<Node8, P>(primitives, count as u32, rays)?;
-    check_width::<Node4, P>(primitives, count as u32, rays)
+    let (builder, count) = (Builder::new(), count as u32);
+    let aabbs: Vec<Aabb> = (0..count).map(|i| primitives.aabb(i)).collect();
+    let eight = builder.build_primitives::<Node8>(&aabbs);
+    check_hierarchy!(eight, "8 wide", primitives, count, rays);
+    let four = builder.build_primitives::<Node4>(&aabbs);
+    check_hierarchy!(four, "4 wide", primitives, count, rays);
+    let eight = builder.build_compact_primitives::<CompactNode8>(&aabbs);
+    check_hierarchy!(eight, "compact, 8 wide", primitives, count, rays);
+    let four = builder.build_compact_primitives::<CompactNode4>(&aabbs);
+    check_hierarchy!(four, "compact, 4 wide", primitives, count, rays);
+    Ok(())
 }
 
 fn rays() -> impl Strategy<Value = Vec<Ray>> {

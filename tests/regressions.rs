@@ -406,3 +406,19 @@ fn rtbvh_4_quads_from_straight_above() {
         }
     }
 }
+
+/// Found here: `t` by the weights of `f32` overflows where the exact ones have it finite, and the triangle was passed over for
+/// being too far.
+#[test]
+fn t_that_overflows_by_f32() {
+    let scene = one_triangle([
+        [-1.882_250_4, -1.882_250_1, 1.418_314_7e31],
+        [1.882_247, 1.882_25, 6.694_649e31],
+        [5.935_84e-8, -8.008_322_5e-7, 4.056_480_5e31],
+    ]);
+    let direction = [0.0, 0.0, 2f32.powi(-23)];
+    let ray = Ray::new([0.0; 3], direction).with_range(0.0, f32::MAX);
+    assert!(hit(&scene, ray).is_some_and(|hit| hit.t > 3.402_823e38));
+    let behind = Ray::new([0.0; 3], -Vec3::from(direction)).with_range(-f32::MAX, 0.0);
+    assert!(hit(&scene, behind).is_some_and(|hit| hit.t < -3.402_823e38));
+}

@@ -59,7 +59,8 @@ impl<'m> Builder<'m> {
 
     /// A builder for what the hierarchy is for, which refuses primitives that are not finite.
     ///
-    /// Only whole builds differ by it: binary trees, and hierarchies from them, are the same.
+    /// [`build_binary`](Self::build_binary), [`build_from_tree`](Self::build_from_tree) and the like do not look at the
+    /// preset.
     pub fn preset(preset: Preset) -> Self {
         Self {
             preset,
@@ -162,7 +163,7 @@ impl<'m> Builder<'m> {
         self.compact_over(&TrianglesInRuns(mesh))
     }
 
-    /// The compact hierarchy over a caller's primitives. See [`build_primitives`](Self::build_primitives).
+    /// The compact hierarchy over a caller's primitives, asked as one of [`build_primitives`](Self::build_primitives) is.
     ///
     /// # Errors
     /// As [`build_primitives`](Self::build_primitives); more than 2^28 - 2 primitives.
@@ -176,6 +177,35 @@ impl<'m> Builder<'m> {
     /// The hierarchy over a caller's primitives, which are numbered as their boxes are.
     ///
     /// A box that is [`Aabb::EMPTY`] stands for a primitive that is never hit.
+    ///
+    /// ```
+    /// use wide_bvh::{Aabb, Builder, Ray, layout::PrimitiveBvh8, primitive::Primitives};
+    ///
+    /// /// Squares of side 2 that face the z axis, each at its own height.
+    /// struct Squares(Vec<f32>);
+    ///
+    /// impl Primitives for Squares {
+    ///     type Detail = ();
+    ///
+    ///     fn aabb(&self, primitive: u32) -> Aabb {
+    ///         let z = self.0[primitive as usize];
+    ///         Aabb::new([-1.0, -1.0, z].into(), [1.0, 1.0, z].into())
+    ///     }
+    ///
+    ///     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, ())> {
+    ///         let t = (self.0[primitive as usize] - ray.origin.z) / ray.direction.z;
+    ///         let point = ray.at(t);
+    ///         (point.x.abs() <= 1.0 && point.y.abs() <= 1.0).then_some((t, ()))
+    ///     }
+    /// }
+    ///
+    /// let squares = Squares(vec![5.0, 3.0, 4.0]);
+    /// let aabbs = [0, 1, 2].map(|primitive| squares.aabb(primitive));
+    /// let bvh: PrimitiveBvh8 = Builder::new().build_primitives(&aabbs)?;
+    /// let hit = bvh.closest_hit(&squares, &Ray::new([0.0; 3], [0.1, 0.0, 1.0])).unwrap();
+    /// assert_eq!(hit.primitive, 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The first box that is not finite or has `min` above `max`; too many of them.
@@ -261,11 +291,10 @@ impl<'m> Builder<'m> {
         &self,
         input: &I,
     ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
-        let compact = match N::WIDTH {
+        match N::WIDTH {
             4 => compact(&self.wide_over::<Node4, I>(input)?),
             _ => compact(&self.wide_over::<Node8, I>(input)?),
-        };
-        Ok(compact?)
+        }
     }
 
     fn wide_from<N: WideNode, I: Input>(

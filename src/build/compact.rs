@@ -1,5 +1,6 @@
 //! Compact hierarchies from full ones: the same tree, its boxes on the grids of the nodes.
 
+use super::BuildError;
 use crate::{
     geometry::Aabb,
     layout::{
@@ -15,7 +16,7 @@ use std::vec::Vec;
 /// More primitive numbers than links tell apart.
 pub(super) fn compact<N: WideNode, C: WideNode>(
     full: &Bvh<N, PrimitiveLeaf, Owned>,
-) -> Result<Bvh<C, RunLeaf, Owned>, LayoutError> {
+) -> Result<Bvh<C, RunLeaf, Owned>, BuildError> {
     // Leaves' primitives in the order of leaves, which a builder along a curve has not.
     let mut primitives = Vec::with_capacity(full.primitives().len());
     let run = |leaf: &PrimitiveLeaf| {
@@ -42,6 +43,10 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
     };
     let nodes: Vec<C> = full.nodes().iter().map(node).collect();
     let bounds = tested_bounds(&nodes, *full.bounds());
-    let compact = Bvh::from_parts(nodes, (), primitives, bounds)?;
+    let count = primitives.len();
+    let compact = Bvh::from_parts(nodes, (), primitives, bounds).map_err(|error| match error {
+        LayoutError::TooLarge => BuildError::TooManyPrimitives(count),
+        bug => BuildError::Layout(bug),
+    })?;
     Ok(compact.with_dropped(full.dropped() as u32))
 }

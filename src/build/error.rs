@@ -31,7 +31,7 @@ pub enum BuildError {
     },
     /// There are this many primitives, which is more than
     /// [`TriangleMesh::MAX_TRIANGLES`](crate::geometry::TriangleMesh::MAX_TRIANGLES), or a tree that
-    /// lists them this often.
+    /// lists them this often; or, over a compact hierarchy's limit of 2^28 - 2, numbers in its leaves.
     TooManyPrimitives(usize),
     /// No leaf of the tree lists this primitive, which can be hit.
     PrimitiveMissing {
@@ -72,7 +72,7 @@ pub enum RefitError {
         /// The first triangle for which there is no room.
         primitive: usize,
     },
-    /// What no hierarchy can be built of.
+    /// A triangle or a box that no hierarchy can be built of: it is not finite, or inside out.
     Primitive {
         /// The primitive.
         primitive: usize,
@@ -99,29 +99,21 @@ impl fmt::Display for RefitError {
             Self::PrimitiveGone { primitive } => {
                 write!(f, "primitive {primitive} is not there any more")
             }
-            Self::PrimitiveLeftOut { primitive } => {
-                write!(
-                    f,
-                    "primitive {primitive} can be hit now, and is not in the hierarchy"
-                )
-            }
+            Self::PrimitiveLeftOut { primitive } => write!(
+                f,
+                "primitive {primitive} can be hit now, and was left out when this was built: build again"
+            ),
             Self::VerticesParted { primitive } => write!(
                 f,
-                "triangle {primitive}: vertices that were one are not, and its leaf has no room for them"
+                "triangle {primitive}: vertices that were at one place have parted, more than its leaf has room for: build again"
             ),
             Self::Primitive { error, .. } => error.fmt(f),
         }
     }
 }
 
-impl Error for RefitError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match self {
-            Self::Primitive { error, .. } => Some(error),
-            _ => None,
-        }
-    }
-}
+// What is inside is in the text: there is no source that would say it twice.
+impl Error for RefitError {}
 
 impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -133,7 +125,7 @@ impl fmt::Display for BuildError {
                 position: Vec3 { x, y, z },
             } => write!(
                 f,
-                "triangle {triangle}, corner {corner}: vertex {vertex} is at ({x}, {y}, {z})"
+                "triangle {triangle}, corner {corner}: vertex {vertex} is not finite, but ({x}, {y}, {z})"
             ),
             Self::NonFiniteBox { primitive } => {
                 write!(f, "primitive {primitive}: its box is NaN or infinite")
@@ -141,7 +133,10 @@ impl fmt::Display for BuildError {
             Self::InvalidBox { primitive } => {
                 write!(f, "primitive {primitive}: its box has min above max")
             }
-            Self::TooManyPrimitives(count) => write!(f, "{count} primitives are too many"),
+            Self::TooManyPrimitives(count) => write!(
+                f,
+                "{count} primitives are more than a hierarchy tells apart"
+            ),
             Self::PrimitiveMissing { primitive } => {
                 write!(f, "primitive {primitive} is in no leaf of the tree")
             }
@@ -159,14 +154,8 @@ impl fmt::Display for BuildError {
     }
 }
 
-impl Error for BuildError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match self {
-            Self::Layout(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+// What is inside is in the text: there is no source that would say it twice.
+impl Error for BuildError {}
 
 impl From<LayoutError> for BuildError {
     fn from(error: LayoutError) -> Self {

@@ -110,8 +110,9 @@ pub(super) fn lay_out<T>(
         }
     }
     for index in (0..nodes.len()).rev() {
-        if !nodes[index].is_leaf() {
-            let [left, right] = nodes[index].children();
+        let [left, right] = nodes[index].children();
+        // A part of a build that was cancelled may have children that are not there.
+        if !nodes[index].is_leaf() && left.max(right) < nodes.len() {
             nodes[index].aabb = nodes[left].aabb.join(nodes[right].aabb);
         }
     }

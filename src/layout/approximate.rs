@@ -39,6 +39,10 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
         L::numbers(primitives)
     }
 
+    fn known<S: Storage>(store: &L::Store<S>) -> Option<usize> {
+        L::known::<S>(store)
+    }
+
     fn borrowed<S: Storage>(store: &L::Store<S>) -> L::Store<Borrowed<'_>> {
         L::borrowed::<S>(store)
     }
@@ -108,7 +112,8 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// needles, and on triangles seen nearly edge-on, `u`, `v` and `t` are as far off as `f32` has them, and with them
     /// which of two triangles is first: over needles 10^-3 to 10^-5 as wide as long, one ray in a thousand has `t` off by
     /// more than 3·10^-3 of itself, where the exact test has 3·10^-6, and a few in a thousand hit what they pass.
-    /// Still, no ray slips through a closed mesh, whose size is between 10^-15 and 10^15.
+    /// Still, no line slips through a closed mesh, whose size is between 10^-15 and 10^15; a ray may, by a `t` that is too far
+    /// off for its range, at triangles that reach from before its origin to behind it.
     ///
     /// ```
     /// # use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}};

@@ -9,7 +9,9 @@ use core::fmt;
 
 /// A wide bounding volume hierarchy: nodes `N`, leaves `L`, memory of `S`.
 ///
-/// Built by [`Builder`](crate::build::Builder), or put together from parts by [`from_parts`](Self::from_parts).
+/// Built by [`Builder`](crate::build::Builder), opened by [`from_bytes`](Bvh::from_bytes), or put together by
+/// [`from_parts`](Self::from_parts). Which kinds there are is in the module's [aliases](super#types), how they are asked in
+/// [`traverse`](crate::traverse).
 #[derive(Clone)]
 pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     nodes: S::Slice<N>,
@@ -23,21 +25,21 @@ pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     dropped: u32,
 }
 
-/// Triangles under 8-wide nodes, borrowed.
+/// Triangles under 8-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type Bvh8Ref<'a> = Bvh<Node8, TriangleLeaf, Borrowed<'a>>;
-/// Triangles under 4-wide nodes, borrowed.
+/// Triangles under 4-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type Bvh4Ref<'a> = Bvh<Node4, TriangleLeaf, Borrowed<'a>>;
-/// A caller's primitives under 8-wide nodes, borrowed.
+/// A caller's primitives under 8-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type PrimitiveBvh8Ref<'a> = Bvh<Node8, PrimitiveLeaf, Borrowed<'a>>;
-/// A caller's primitives under 4-wide nodes, borrowed.
+/// A caller's primitives under 4-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type PrimitiveBvh4Ref<'a> = Bvh<Node4, PrimitiveLeaf, Borrowed<'a>>;
-/// Primitive numbers under 8-wide nodes of 80 bytes, borrowed.
+/// Primitive numbers under 8-wide nodes of 80 bytes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type CompactBvh8Ref<'a> = Bvh<CompactNode8, RunLeaf, Borrowed<'a>>;
-/// Primitive numbers under 4-wide nodes of 48 bytes, borrowed.
+/// Primitive numbers under 4-wide nodes of 48 bytes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type CompactBvh4Ref<'a> = Bvh<CompactNode4, RunLeaf, Borrowed<'a>>;
-/// A mesh's triangles under 8-wide nodes of 80 bytes, borrowed, mesh and all.
+/// A mesh's triangles under 8-wide nodes of 80 bytes, borrowed, mesh and all. Queries: [`traverse`](crate::traverse).
 pub type MeshBvh8<'a> = Bvh<CompactNode8, MeshLeaf<'a>, Borrowed<'a>>;
-/// A mesh's triangles under 4-wide nodes of 48 bytes, borrowed, mesh and all.
+/// A mesh's triangles under 4-wide nodes of 48 bytes, borrowed, mesh and all. Queries: [`traverse`](crate::traverse).
 pub type MeshBvh4<'a> = Bvh<CompactNode4, MeshLeaf<'a>, Borrowed<'a>>;
 
 #[cfg(feature = "alloc")]
@@ -45,17 +47,17 @@ mod owned {
     use super::*;
     use crate::layout::Owned;
 
-    /// Triangles under 8-wide nodes.
+    /// Triangles under 8-wide nodes. Queries: [`traverse`](crate::traverse).
     pub type Bvh8 = Bvh<Node8, TriangleLeaf, Owned>;
-    /// Triangles under 4-wide nodes.
+    /// Triangles under 4-wide nodes. Queries: [`traverse`](crate::traverse).
     pub type Bvh4 = Bvh<Node4, TriangleLeaf, Owned>;
-    /// A caller's primitives under 8-wide nodes.
+    /// A caller's primitives under 8-wide nodes. Queries: [`traverse`](crate::traverse).
     pub type PrimitiveBvh8 = Bvh<Node8, PrimitiveLeaf, Owned>;
-    /// A caller's primitives under 4-wide nodes.
+    /// A caller's primitives under 4-wide nodes. Queries: [`traverse`](crate::traverse).
     pub type PrimitiveBvh4 = Bvh<Node4, PrimitiveLeaf, Owned>;
-    /// Primitive numbers under 8-wide nodes of 80 bytes.
+    /// Primitive numbers under 8-wide nodes of 80 bytes. Queries: [`traverse`](crate::traverse).
     pub type CompactBvh8 = Bvh<CompactNode8, RunLeaf, Owned>;
-    /// Primitive numbers under 4-wide nodes of 48 bytes.
+    /// Primitive numbers under 4-wide nodes of 48 bytes. Queries: [`traverse`](crate::traverse).
     pub type CompactBvh4 = Bvh<CompactNode4, RunLeaf, Owned>;
 }
 #[cfg(feature = "alloc")]
@@ -125,7 +127,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// A link led there.
     #[inline(always)]
     pub(crate) unsafe fn leaf(&self, place: usize) -> L::Ref<'_> {
-        // SAFETY: the check of `from_parts` saw that all leaves led to are there.
+        // SAFETY: the check of `from_parts` saw that all leaves led to are there, or the builder has emitted them in order.
         unsafe { L::at::<S>(&self.leaves, &self.primitives, place) }
     }
 

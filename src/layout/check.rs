@@ -14,8 +14,8 @@ pub(crate) const STACK: usize = 256;
 pub enum LayoutError {
     /// More nodes, leaves or primitives than their numbers can tell apart.
     TooLarge,
-    /// A lane of a node leads elsewhere than to the next node or leaf in order, or an empty lane is not
-    /// empty or not last.
+    /// A lane of a node leads elsewhere than to the next node or leaf in order; or to a node after a lane that leads to a
+    /// leaf, in a compact node; or an empty lane is not empty or not last.
     Child {
         /// The node.
         node: usize,
@@ -31,6 +31,8 @@ pub enum LayoutError {
     },
     /// A leaf is empty, over-full, or its primitives or corners are out of range.
     Leaf(usize),
+    /// At this place of the list is the number of a triangle that the mesh has not.
+    Primitive(usize),
     /// The way to this node needs more stack than a walk has.
     TooDeep(usize),
     /// This many nodes are led to from the root, and there are more.
@@ -42,7 +44,7 @@ pub enum LayoutError {
 impl fmt::Display for LayoutError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::TooLarge => write!(f, "more nodes or leaves than 31 bits tell apart"),
+            Self::TooLarge => write!(f, "more nodes, leaves or primitives than links tell apart"),
             Self::Child { node, lane } => {
                 write!(
                     f,
@@ -55,6 +57,12 @@ impl fmt::Display for LayoutError {
             Self::Leaf(leaf) => {
                 write!(f, "leaf {leaf}: its primitives or corners are out of range")
             }
+            Self::Primitive(place) => {
+                write!(
+                    f,
+                    "primitive number at {place}: the mesh has no such triangle"
+                )
+            }
             Self::TooDeep(node) => write!(f, "node {node}: deeper than a walk's stack"),
             Self::UnusedNodes(used) => write!(f, "nothing leads to the nodes from {used} on"),
             Self::UnusedLeaves(used) => write!(f, "nothing leads to the leaves from {used} on"),
@@ -65,6 +73,9 @@ impl fmt::Display for LayoutError {
 impl Error for LayoutError {}
 
 /// Checks everything that walks take for granted, in linear time, and finds the root.
+///
+/// What the builder emits of full nodes is so by construction, and is not checked but in debug builds: see
+/// [`from_emitted`](super::Bvh::from_emitted). A refit changes boxes alone.
 pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     nodes: &[N],
     leaves: &L::Store<S>,
@@ -73,6 +84,11 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
 ) -> Result<Child, LayoutError> {
     let count = L::count::<S>(leaves, primitives)?;
     let root = root::<N, L>(nodes.len(), count, primitives.len())?;
+    if let Some(known) = L::known::<S>(leaves)
+        && let Some(place) = primitives.iter().position(|&id| id as usize >= known)
+    {
+        return Err(LayoutError::Primitive(place));
+    }
     if nodes.is_empty() {
         return Ok(root);
     }
@@ -94,9 +110,13 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
             return Err(LayoutError::TooDeep(index));
         }
         let first_node = next_node;
+        let mut leaf_met = false;
         for lane in 0..children {
             // SAFETY: the node has so many children.
             let link = unsafe { node.link(lane) };
+            // Compact nodes say all links at once as if nodes came first.
+            let in_order = link.is_leaf() || !(N::NODES_FIRST && leaf_met);
+            leaf_met |= link.is_leaf();
             let fits = if link.is_leaf() {
                 let span = L::span(link.leaf());
                 let follows = span.start == next_leaf;
@@ -108,7 +128,7 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
                 next_node += 1;
                 follows && next_node <= nodes.len()
             };
-            if !fits {
+            if !(fits && in_order) {
                 return Err(LayoutError::Child { node: index, lane });
             }
         }

@@ -16,7 +16,7 @@ pub enum ChildKind {
     Empty,
     /// The place of a node.
     Node(usize),
-    /// The place of a leaf.
+    /// The place of a leaf: see [`Child::leaf`].
     Leaf(usize),
 }
 
@@ -25,17 +25,16 @@ impl Child {
     pub const EMPTY: Self = Self(u32::MAX);
     const LEAF: u32 = 1 << 31;
 
-    /// Node number `index`, less than 2^31.
+    /// Node number `index`, of which 31 bits count.
     #[inline]
     pub const fn node(index: u32) -> Self {
-        debug_assert!(index < Self::LEAF);
-        Self(index)
+        Self(index & !Self::LEAF)
     }
 
-    /// Leaf number `index`, less than 2^31 - 1.
+    /// Leaf number `index`, less than 2^31 - 1, of which 31 bits count. Of a leaf that is a run of the list of primitive
+    /// numbers ([`RunLeaf`](super::RunLeaf)) it is its place in the list, with the number of them less one in bits 28 to 30.
     #[inline]
     pub const fn leaf(index: u32) -> Self {
-        debug_assert!(index < Self::LEAF - 1);
         Self(index | Self::LEAF)
     }
 

@@ -1,7 +1,7 @@
 //! Leaves that are stored: a few triangles that share vertices, or a few of a caller's primitives.
 
 use super::{
-    Triangles,
+    Listed, Triangles,
     bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
 };
 use crate::{
@@ -13,7 +13,7 @@ use core::{fmt::Debug, ops::Range};
 use glam::Vec3;
 
 /// What all leaves that are stored have: primitives, as a run of places in the hierarchy's list of primitive numbers.
-pub trait Leaf: Pod + Debug {
+pub trait Leaf: Pod + Debug + sealed::Sealed {
     /// In the header of [bytes](super::bytes).
     #[doc(hidden)]
     const KIND: u32;
@@ -23,6 +23,12 @@ pub trait Leaf: Pod + Debug {
 
     /// Whether it can be walked: not empty, not over-full, its corners in range.
     fn is_sound(&self) -> bool;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for super::TriangleLeaf {}
+    impl Sealed for super::PrimitiveLeaf {}
 }
 
 /// Up to 8 triangles over up to 8 vertices, in two cache lines.
@@ -188,6 +194,13 @@ impl PrimitiveLeaf {
     #[inline(always)]
     pub(crate) fn range(&self) -> Range<usize> {
         self.first as usize..self.first as usize + self.count as usize
+    }
+}
+
+impl Listed for &PrimitiveLeaf {
+    #[inline(always)]
+    fn places(self) -> Range<usize> {
+        self.range()
     }
 }
 

@@ -33,6 +33,11 @@ pub trait Leaves: Sized {
     fn numbers(_primitives: &[u32]) -> u64 {
         0
     }
+    /// How many primitives there are for numbers to tell apart, if that is known.
+    #[doc(hidden)]
+    fn known<S: Storage>(_store: &Self::Store<S>) -> Option<usize> {
+        None
+    }
     /// The same, borrowed.
     #[doc(hidden)]
     fn borrowed<S: Storage>(store: &Self::Store<S>) -> Self::Store<Borrowed<'_>>;
@@ -173,6 +178,13 @@ pub trait Triangles: Copy {
     ) -> Option<TriangleHits<T::F32x8>> {
         along.test::<8, NEED_T, Self::Precision>(token, corners, edges, t_max)
     }
+}
+
+/// A leaf that is a run of the list of primitive numbers, and no more.
+#[doc(hidden)]
+pub trait Listed: Copy {
+    /// Its places in the list.
+    fn places(self) -> Range<usize>;
 }
 
 /// Leaves of triangles.

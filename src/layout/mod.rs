@@ -29,6 +29,7 @@ pub use child::{Child, ChildKind, Link};
 pub use compact::{CompactNode, CompactNode4, CompactNode8};
 pub use full::{Node, Node4, Node8};
 pub use leaf::{Leaf, PrimitiveLeaf, TriangleLeaf};
+pub(crate) use leaves::Listed;
 pub use leaves::{Leaves, TriangleLeaves, Triangles};
 pub use node::WideNode;
 pub use run::{MeshLeaf, MeshTooSmall, RunLeaf, Runs};

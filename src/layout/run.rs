@@ -1,6 +1,6 @@
 //! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
 
-use super::{Borrowed, Bvh, LayoutError, Leaves, Storage, Triangles, WideNode};
+use super::{Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode};
 use crate::{
     geometry::TriangleMesh,
     primitive::triangle::{Corners, Exact, RayShear},
@@ -24,8 +24,8 @@ pub(crate) const fn of_place(place: usize) -> Range<usize> {
 #[derive(Clone, Copy, Debug)]
 pub struct Runs<M>(M);
 
-/// Leaves of up to 8 primitives, of which the hierarchy knows the numbers alone. What they are each query is told
-/// ([`Primitives`](crate::primitive::Primitives)); or, of triangles, the hierarchy is: [`Bvh::over`].
+/// Leaves of up to 8 primitives, of which the hierarchy knows the numbers alone. What they are is told to each query
+/// ([`Primitives`](crate::primitive::Primitives)); or, if they are triangles, to the hierarchy: [`Bvh::over`].
 pub type RunLeaf = Runs<()>;
 /// Leaves of up to 8 triangles of a mesh, which are read where the mesh has them.
 pub type MeshLeaf<'m> = Runs<TriangleMesh<'m>>;
@@ -39,7 +39,26 @@ pub struct Run<'a, M> {
     place: u32,
 }
 
-impl<M: Copy> Leaves for Runs<M> {
+/// What leaves' primitives are read from.
+#[doc(hidden)]
+pub trait Numbered {
+    /// How many there are, if that is known.
+    fn count(&self) -> Option<usize>;
+}
+
+impl Numbered for () {
+    fn count(&self) -> Option<usize> {
+        None
+    }
+}
+
+impl Numbered for TriangleMesh<'_> {
+    fn count(&self) -> Option<usize> {
+        Some(self.len())
+    }
+}
+
+impl<M: Copy + Numbered> Leaves for Runs<M> {
     type Store<S: Storage> = M;
     type Ref<'a> = Run<'a, M>;
 
@@ -64,6 +83,10 @@ impl<M: Copy> Leaves for Runs<M> {
     fn numbers(primitives: &[u32]) -> u64 {
         let greatest = primitives.iter().max();
         greatest.map_or(0, |&number| u64::from(number) + 1)
+    }
+
+    fn known<S: Storage>(of: &M) -> Option<usize> {
+        of.count()
     }
 
     fn borrowed<S: Storage>(of: &M) -> M {
@@ -103,6 +126,13 @@ impl<M> Run<'_, M> {
     }
 }
 
+impl Listed for Run<'_, ()> {
+    #[inline(always)]
+    fn places(self) -> Range<usize> {
+        self.range()
+    }
+}
+
 impl Triangles for Run<'_, TriangleMesh<'_>> {
     type Precision = Exact;
 
@@ -122,8 +152,8 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
         let Range { start, end } = self.range();
         let mut triangles = [&[0; 3]; MAX_RUN];
         for (lane, triangle) in triangles.iter_mut().enumerate() {
-            // SAFETY: the layout's check saw that the run is within the list, and `over`, that every number of the list
-            // is within the mesh.
+            // SAFETY: the layout's check saw that the run is within the list, and, as `over` has, that every number of the
+            // list is within the mesh.
             *triangle = unsafe {
                 let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
                 indices.get_unchecked(number as usize)
@@ -201,11 +231,13 @@ pub struct MeshTooSmall {
 impl fmt::Display for MeshTooSmall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { triangles, needed } = self;
-        write!(
-            f,
-            "a mesh of {triangles} triangles where leaves have numbers up to {}",
-            needed - 1
-        )
+        match triangles {
+            0 => write!(f, "no mesh, where one of {needed} triangles is needed"),
+            _ => write!(
+                f,
+                "a mesh of {triangles} triangles, where {needed} are needed"
+            ),
+        }
     }
 }
 

@@ -2,10 +2,18 @@
 
 use core::{marker::PhantomData, ops::Deref};
 
-/// Where the parts of a hierarchy lie: in vectors of its own, or in somebody else's memory.
-pub trait Storage {
+/// Where the parts of a hierarchy lie: in vectors of its own, or in somebody else's memory. There are no others: that a slice
+/// stays what it was when it was checked is what walks rely on.
+pub trait Storage: sealed::Sealed {
     /// A run of `T`.
     type Slice<T: 'static + Clone>: Deref<Target = [T]> + Clone;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    #[cfg(feature = "alloc")]
+    impl Sealed for super::Owned {}
+    impl Sealed for super::Borrowed<'_> {}
 }
 
 /// In vectors of its own.

@@ -315,7 +315,8 @@ impl<V> Along<V> {
             * reciprocal.abs();
         let (least_t, most_t) = (t - error, t + error);
         let (t_min, infinity) = (self.t_min, V::splat(token, f32::INFINITY));
-        let outside = sound & (most_t.lt(t_min) | t_max.lt(least_t));
+        // Where `t` has overflowed, it is not known how far it is off.
+        let outside = sound & t.abs().lt(infinity) & (most_t.lt(t_min) | t_max.lt(least_t));
         let candidates = candidates & !outside.bits();
         let mut mask = candidates & certain.bits();
         if !NEED_T {

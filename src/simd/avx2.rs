@@ -83,7 +83,8 @@ macro_rules! impl_vector {
         impl_operator!($vector, BitOr, bitor, $or);
 
         // SAFETY of every block below: `Avx2::detect` saw the instructions, and only its token, or a
-        // vector made through it, gets here. Loads and stores are of whole arrays, unaligned.
+        // vector made through it, gets here. Loads and stores are of whole arrays, unaligned; but for `compress`, which
+        // writes where its caller promises room for a vector.
         #[allow(clippy::undocumented_unsafe_blocks)]
         impl Lanes for $vector {
             type Token = Avx2;

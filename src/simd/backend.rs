@@ -65,6 +65,16 @@ impl Backend {
         }
     }
 
+    /// As [`run`](Self::run), for what takes much stack: a call for every backend, whose frames the caller's has no part of.
+    #[inline(always)]
+    pub(crate) fn run_apart<O: Operation>(self, operation: O) -> O::Output {
+        match self.0 {
+            Kind::Portable => run_portable(operation),
+            #[cfg(target_arch = "x86_64")]
+            _ => self.run(operation),
+        }
+    }
+
     /// As [`run`](Self::run), by a call, so that what `operation` needs of registers is not taken from the caller's.
     #[inline(never)]
     pub(crate) fn call<O: Operation>(self, operation: O) -> O::Output {
@@ -84,6 +94,11 @@ impl Backend {
             Kind::Avx512(avx512) => unsafe { run_avx512(operation, avx512) },
         }
     }
+}
+
+#[inline(never)]
+fn run_portable<O: Operation>(operation: O) -> O::Output {
+    operation.run(Portable)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -1,7 +1,9 @@
-//! The few vector operations the kernels need, once for each instruction set, and the choice between them
-//! when running.
+//! The choice of instructions when running.
 //!
-//! Every operation that decides a hit gives the same bits on every backend.
+//! A hierarchy takes the fastest [`Backend`] that the processor has. Every one gives the same answers, bit for bit.
+
+// The few vector operations that the kernels need are here once for each instruction set. Every one that decides a hit
+// gives the same bits on all of them.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

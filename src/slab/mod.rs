@@ -31,10 +31,10 @@
 //! u·|p·r| + u·|o·r| <= u·D·|r| (products), u·(|o·r| + E) (constant) and u·(D·|r| + E) (sum): 4u·D·|r| + 2u·E.
 //! 7 + 4 = 11, and D and E are themselves rounded: **K_BOX = 14** gives near <= t* <= far on every axis.
 //!
-//! *(3) The same where r was cut off* at R = 2^48, that is |d| < 1/R: multiplied by R, the inequality reads
-//! (lo - o)·R <= d·R·t* + 7u·D·R with |d·R| <= 1, so |t*| has to fit in what is left of K_BOX,
-//! 14 - 7 - 4 > 2 u·D·R = 2^25·D. And |t*| <= M / |d.z| < 2^24·D, for d.z, the largest component, is at least 2^-23.
-//! This is why R is not smaller.
+//! *(3) The same where r was cut off* at R = 2^48, that is |d| < 1/R: (2) multiplied by R instead of by |r| has
+//! |d·R| <= 1 times t* where it had t*. It is off from t* by less than 2·|t*|, for which there are the
+//! 14 - 7 - 4 = 3 u·D·R = 3·2^24·D that are left of K_BOX: and |t*| <= M / |d.z| <= 2^23·D (1 + u), for d.z, the
+//! largest component, is at least 2^-23. This is why R is not smaller.
 //!
 //! *(4) The computed t is within S of t\*.* It is Z.a + v·(Z.b - Z.a) + w·(Z.c - Z.a), times r.z, of computed
 //! weights. Those of `f64` are good to 2^-50 and then rounded. In `f32`, with X and Y the largest |x'| and |y'|

@@ -29,6 +29,7 @@ impl<const LANES: usize> Scratch<LANES> {
     /// Fresh memory: nothing is written.
     #[inline]
     pub const fn new() -> Self {
+        const { assert!(0 < LANES && LANES <= wave::MOST_LANES, "1 to 64 lanes") };
         Self([const { MaybeUninit::uninit() }; LANES])
     }
 }
@@ -51,9 +52,21 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
 /// the tree side by side; others are interleaved. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack, where this crate is optimised.
+    ///
+    /// ```
+    /// # use wide_bvh::{Builder, Ray, TriangleMesh};
+    /// # let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+    /// # let mesh = TriangleMesh::new(&positions, &[[0, 1, 2_u32]])?;
+    /// # let bvh = Builder::new().build(&mesh)?;
+    /// let rays: Vec<Ray> = (0..9).map(|i| Ray::new([0.2 * i as f32, 0.1, 0.0], [0.0, 0.0, 1.0])).collect();
+    /// let mut hits = vec![None; rays.len()];
+    /// bvh.closest_hits(&rays, &mut hits);
+    /// assert_eq!(hits.iter().flatten().count(), 5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.backend().run(Batch::<N, L, S, ClosestHit> {
+        self.backend().run_apart(Batch::<N, L, S, ClosestHit> {
             bvh: self,
             rays,
             answers: hits,
@@ -61,9 +74,9 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.backend().run(Batch::<N, L, S, AnyHit> {
+        self.backend().run_apart(Batch::<N, L, S, AnyHit> {
             bvh: self,
             rays,
             answers: occluded,
@@ -79,13 +92,14 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray],
         hits: &mut [Option<Hit>],
     ) {
-        self.backend().run(Wave::<N, L, S, ClosestHit, LANES> {
-            bvh: self,
-            rays,
-            answers: hits,
-            scratch,
-            one: Self::closest_hit,
-        });
+        self.backend()
+            .run_apart(Wave::<N, L, S, ClosestHit, LANES> {
+                bvh: self,
+                rays,
+                answers: hits,
+                scratch,
+                one: Self::closest_hit,
+            });
     }
 
     /// As [`any_hits`](Self::any_hits), in the caller's memory. See [`closest_hits_in`](Self::closest_hits_in).
@@ -95,7 +109,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray],
         occluded: &mut [bool],
     ) {
-        self.backend().run(Wave::<N, L, S, AnyHit, LANES> {
+        self.backend().run_apart(Wave::<N, L, S, AnyHit, LANES> {
             bvh: self,
             rays,
             answers: occluded,
@@ -114,12 +128,13 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [Option<Hit>; RAYS] {
-        self.backend().run(Packet::<N, L, S, ClosestHit, RAYS> {
-            bvh: self,
-            rays,
-            active,
-            one: Self::closest_hit,
-        })
+        self.backend()
+            .run_apart(Packet::<N, L, S, ClosestHit, RAYS> {
+                bvh: self,
+                rays,
+                active,
+                one: Self::closest_hit,
+            })
     }
 
     /// Whether [anything is in the way](Self::any_hit) of each ray that `active` has a bit for; `false` for the others.
@@ -128,7 +143,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [bool; RAYS] {
-        self.backend().run(Packet::<N, L, S, AnyHit, RAYS> {
+        self.backend().run_apart(Packet::<N, L, S, AnyHit, RAYS> {
             bvh: self,
             rays,
             active,

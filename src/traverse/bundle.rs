@@ -280,8 +280,8 @@ impl<'a, T: Simd> Bundle<'a, T> {
                         lane: lane as u32,
                         rays,
                     };
-                    // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children
-                    // behind; those from `base` to `len` were just written.
+                    // SAFETY: the layout's check saw that a walk leaves less than `STACK` children behind, so there is
+                    // room for the one that it goes on to; those from `base` to `len` were just written.
                     unsafe { insert(&mut stack, base, len, entry) };
                     len += 1;
                 }

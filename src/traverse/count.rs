@@ -11,7 +11,7 @@ pub struct Counts {
     pub nodes: u32,
     /// Leaves reached.
     pub leaves: u32,
-    /// Primitives in these leaves.
+    /// Triangles in these leaves.
     pub triangles: u32,
 }
 

@@ -22,7 +22,7 @@ use crate::{
 use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
 
 /// The most lanes of a wave.
-const MOST_LANES: usize = 64;
+pub(super) const MOST_LANES: usize = 64;
 
 /// A stack's places: [`BOTTOM`], the entries, and room to write a whole vector above the last.
 const PLACES: usize = STACK + 16;

@@ -39,6 +39,8 @@ pub enum BytesError {
         /// How many there are.
         found: usize,
     },
+    /// A field of the header counts what hierarchies of this kind have none of, or is reserved.
+    NotZero(&'static str),
     /// The bytes do not start at a multiple of this.
     Misaligned {
         /// What the first byte's address is to be a multiple of.
@@ -69,21 +71,35 @@ impl fmt::Display for BytesError {
             Self::ByteOrder => write!(f, "written by a machine of the other byte order"),
             Self::Version(version) => write!(f, "version {version} of the format is not known"),
             Self::Nodes { expected, found } => {
-                write!(f, "nodes of kind {found}, not of kind {expected}")
+                let (found, expected) = (nodes(found), nodes(expected));
+                write!(f, "{found} nodes, where {expected} ones were asked for")
             }
             Self::Leaves { expected, found } => {
-                write!(f, "leaves of kind {found}, not of kind {expected}")
+                let (found, expected) = (leaves(found), leaves(expected));
+                write!(
+                    f,
+                    "leaves of {found}, where those of {expected} were asked for"
+                )
             }
             Self::Length { expected, found } => {
-                write!(f, "{found} bytes where the header tells of {expected}")
+                let what = if (found as u64) < expected {
+                    "cut short"
+                } else {
+                    "too long"
+                };
+                write!(
+                    f,
+                    "{what}: {found} bytes, and the header tells of {expected}"
+                )
             }
+            Self::NotZero(field) => write!(f, "the header's field `{field}` is not 0"),
             Self::Misaligned { needed } => {
-                write!(f, "the first byte is not at a multiple of {needed}")
+                write!(f, "the first byte's address is no multiple of {needed}")
             }
             Self::Checksum { expected, found } => {
                 write!(
                     f,
-                    "some bytes have changed: checksum {found:08x}, not {expected:08x}"
+                    "some bytes have changed: their checksum is {found:08x}, the header has {expected:08x}"
                 )
             }
             Self::Layout(error) => error.fmt(f),
@@ -94,16 +110,29 @@ impl fmt::Display for BytesError {
     }
 }
 
-impl Error for BytesError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match self {
-            Self::Layout(error) => Some(error),
-            Self::Mesh(error) => Some(error),
-            Self::MeshTooSmall(error) => Some(error),
-            _ => None,
-        }
+/// A kind of nodes for people.
+fn nodes(kind: u32) -> &'static str {
+    match kind {
+        1 => "4-wide",
+        2 => "8-wide",
+        3 => "compact 4-wide",
+        4 => "compact 8-wide",
+        _ => "unknown",
     }
 }
+
+/// A kind of leaves for people.
+fn leaves(kind: u32) -> &'static str {
+    match kind {
+        1 => "triangles",
+        2 => "a caller's primitives",
+        3 => "primitive numbers alone",
+        _ => "an unknown kind",
+    }
+}
+
+// What is inside is in the text: there is no source that would say it twice.
+impl Error for BytesError {}
 
 impl From<LayoutError> for BytesError {
     fn from(error: LayoutError) -> Self {

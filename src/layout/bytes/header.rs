@@ -113,11 +113,22 @@ impl Header {
     /// Where nodes, leaves, primitives, positions and indices are, all within the bytes.
     ///
     /// # Errors
-    /// There are more bytes or fewer than for those.
+    /// What such hierarchies have none of is counted, or there are more bytes or fewer than for those.
     pub(super) fn sections<N: WideNode, L: InBytes>(
         &self,
         bytes: &[u8],
     ) -> Result<[Range<usize>; 5], BytesError> {
+        let none = [
+            ("leaves", self.leaves, L::SIZE == 0),
+            ("positions", self.positions, !L::MESH),
+            ("triangles", self.triangles, !L::MESH),
+            ("reserved", self.reserved.iter().fold(0, |a, b| a | b), true),
+        ];
+        for (field, value, is_none) in none {
+            if is_none && value != 0 {
+                return Err(BytesError::NotZero(field));
+            }
+        }
         let (_, end) = self.ends::<N, L>();
         if end != bytes.len() as u64 {
             return Err(BytesError::Length {

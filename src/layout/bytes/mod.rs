@@ -48,6 +48,12 @@ pub trait InBytes: Leaves {
     /// Bytes of a leaf; 0 if none is stored.
     #[doc(hidden)]
     const SIZE: usize;
+    /// What leaves that are stored are to begin at a multiple of.
+    #[doc(hidden)]
+    const ALIGN: usize = 1;
+    /// Whether there may be a mesh.
+    #[doc(hidden)]
+    const MESH: bool = true;
     /// What there is to write: the leaves, and of a mesh the positions and indices.
     #[doc(hidden)]
     fn sections<S: Storage>(store: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]);
@@ -65,14 +71,13 @@ pub trait Open<'a>: InBytes {
         positions: &'a [[f32; 3]],
         indices: &'a [[u32; 3]],
     ) -> Result<Self::Store<Borrowed<'a>>, BytesError>;
-    /// How many primitives there are, if that is known.
-    #[doc(hidden)]
-    fn known(store: &Self::Store<Borrowed<'a>>) -> Option<usize>;
 }
 
 impl<L: Leaf> InBytes for L {
     const KIND: u32 = <L as Leaf>::KIND;
     const SIZE: usize = size_of::<L>();
+    const ALIGN: usize = align_of::<L>();
+    const MESH: bool = false;
 
     fn sections<S: Storage>(store: &S::Slice<L>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
         (cast_slice(store), &[], &[])
@@ -82,10 +87,6 @@ impl<L: Leaf> InBytes for L {
 impl<'a, L: Leaf> Open<'a> for L {
     fn open(leaves: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<&'a [L], BytesError> {
         cast(leaves)
-    }
-
-    fn known(_: &&'a [L]) -> Option<usize> {
-        None
     }
 }
 
@@ -101,10 +102,6 @@ impl InBytes for RunLeaf {
 impl<'a> Open<'a> for RunLeaf {
     fn open(_: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<(), BytesError> {
         Ok(())
-    }
-
-    fn known((): &()) -> Option<usize> {
-        None
     }
 }
 
@@ -125,24 +122,24 @@ impl<'a> Open<'a> for MeshLeaf<'a> {
     ) -> Result<TriangleMesh<'a>, BytesError> {
         Ok(TriangleMesh::new(positions, indices)?)
     }
-
-    fn known(mesh: &TriangleMesh<'a>) -> Option<usize> {
-        Some(mesh.len())
-    }
 }
 
 impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
     /// Opens a hierarchy in place: no copy, no allocation, and no trust. The bytes are checked once, in linear time,
     /// and are then traversed as any hierarchy is.
     ///
-    /// They are to start at a multiple of the alignment of nodes and leaves: 4 for compact nodes without leaves of
-    /// their own, else up to 64. What maps a file or allocates pages gives that; see also [`Aligned`].
+    /// They are to start at a multiple of 4 bytes for compact nodes, of 64 for nodes over triangles, of 16 and 32 for 4- and
+    /// 8-wide nodes over a caller's primitives. What maps a file or allocates pages gives that; see also [`Aligned`].
     ///
     /// # Errors
     /// Whatever else than a whole file of this version, machine and kind, unharmed: what is wrong with it and where.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, BytesError> {
         let header = Header::read(bytes)?;
         header.expect(N::KIND, L::KIND)?;
+        let needed = align_of::<N>().max(L::ALIGN).max(align_of::<u32>());
+        if !bytes.as_ptr().addr().is_multiple_of(needed) {
+            return Err(BytesError::Misaligned { needed });
+        }
         let [nodes, leaves, primitives, positions, indices] = header.sections::<N, L>(bytes)?;
         checksum::check(bytes)?;
         let store = L::open(
@@ -150,20 +147,15 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
             cast(&bytes[positions])?,
             cast(&bytes[indices])?,
         )?;
-        let known = L::known(&store);
-        let bvh = Self::from_parts(
-            cast(&bytes[nodes])?,
-            store,
-            cast(&bytes[primitives])?,
-            header.bounds(),
-        )?;
-        match known {
-            Some(triangles) if bvh.numbers > triangles as u64 => {
-                let needed = bvh.numbers;
-                Err(MeshTooSmall { triangles, needed }.into())
+        let primitives = cast(&bytes[primitives])?;
+        if let Some(triangles) = L::known::<Borrowed>(&store) {
+            let needed = L::numbers(primitives);
+            if needed > triangles as u64 {
+                return Err(MeshTooSmall { triangles, needed }.into());
             }
-            _ => Ok(bvh.with_dropped(header.dropped)),
         }
+        let bvh = Self::from_parts(cast(&bytes[nodes])?, store, primitives, header.bounds())?;
+        Ok(bvh.with_dropped(header.dropped))
     }
 }
 
