@@ -54,12 +54,12 @@ pub(crate) fn ask<N: WideNode>(
         add("one by one", singles(&bvh, rays));
         add("counted", counted(&bvh, rays));
         add("a batch", batch(&bvh, rays));
-        add("one lane", waves::<N, 1>(&bvh, rays));
-        add("13 lanes", waves::<N, 13>(&bvh, rays));
-        add("64 lanes", waves::<N, 64>(&bvh, rays));
-        add("packets of 4", packets::<N, 4>(&bvh, rays, active));
-        add("packets of 8", packets::<N, 8>(&bvh, rays, active));
-        add("packets of 64", packets::<N, 64>(&bvh, rays, active));
+        add("one lane", waves::<N, _, 1>(&bvh, rays));
+        add("13 lanes", waves::<N, _, 13>(&bvh, rays));
+        add("64 lanes", waves::<N, _, 64>(&bvh, rays));
+        add("packets of 4", packets::<N, _, 4>(&bvh, rays, active));
+        add("packets of 8", packets::<N, _, 8>(&bvh, rays, active));
+        add("packets of 64", packets::<N, _, 64>(&bvh, rays, active));
         approximate(&bvh, rays);
     }
     answers
@@ -121,8 +121,8 @@ fn unanswered(rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     (vec![Some(wrong); rays.len()], vec![true; rays.len()])
 }
 
-fn waves<N: WideNode, const LANES: usize>(
-    bvh: &Bvh<N, TriangleLeaf, Borrowed>,
+fn waves<N: WideNode, L: TriangleLeaves, const LANES: usize>(
+    bvh: &Bvh<N, L, Borrowed>,
     rays: &[Ray],
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
     let (mut hits, mut occluded) = unanswered(rays);
@@ -133,8 +133,8 @@ fn waves<N: WideNode, const LANES: usize>(
     (hits, occluded)
 }
 
-fn packets<N: WideNode, const RAYS: usize>(
-    bvh: &Bvh<N, TriangleLeaf, Borrowed>,
+fn packets<N: WideNode, L: TriangleLeaves, const RAYS: usize>(
+    bvh: &Bvh<N, L, Borrowed>,
     rays: &[Ray],
     active: u64,
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
@@ -160,7 +160,7 @@ fn packets<N: WideNode, const RAYS: usize>(
     (hits, occluded)
 }
 
-/// As [`ask`], of leaves that read a mesh, one by one.
+/// As [`ask`], of leaves that read a mesh, in a few ways.
 pub(crate) fn ask_mesh<'a, N: WideNode>(
     mut bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
     rays: &[Ray],
@@ -171,6 +171,9 @@ pub(crate) fn ask_mesh<'a, N: WideNode>(
         let asked = [
             ("one by one", singles(&bvh, rays)),
             ("counted", counted(&bvh, rays)),
+            ("a batch", batch(&bvh, rays)),
+            ("13 lanes", waves::<N, _, 13>(&bvh, rays)),
+            ("packets of 8", packets::<N, _, 8>(&bvh, rays, u64::MAX)),
         ];
         answers.extend(asked.map(|(how, (closest, any))| Answers {
             how: format!("{how}, of a mesh, {} wide, {}", N::WIDTH, backend.name()),

@@ -1,24 +1,38 @@
-//! Building hierarchies: from primitives to a binary tree, from there to wide nodes.
+//! Building hierarchies.
 //!
-//! 1. `refs`: every primitive of the `input` is looked at; its box and its number.
-//! 2. `spatial`, for large triangles, some of which become `pieces`, by `clip`; then `binned`, by `split` and
-//!    `sweep`: the binary tree, from the top down. Or `adopt`: a caller's.
-//! 3. `reinsertion`: subtrees are moved to where they cost least.
-//! 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`; `cuts`, how.
-//! 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
-//! 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
+//! | over | [`Builder`] | is a |
+//! | --- | --- | --- |
+//! | a mesh | [`build`](Builder::build), [`build_as`](Builder::build_as) | [`Bvh8`](crate::layout::Bvh8), [`Bvh4`](crate::layout::Bvh4) |
+//! | a mesh that stays where it is, in little memory | [`build_compact`](Builder::build_compact) | [`CompactBvh8`](crate::layout::CompactBvh8), [`CompactBvh4`](crate::layout::CompactBvh4) |
+//! | primitives of your own | [`build_primitives`](Builder::build_primitives) | [`PrimitiveBvh8`](crate::layout::PrimitiveBvh8), [`PrimitiveBvh4`](crate::layout::PrimitiveBvh4) |
+//! | the same, in little memory | [`build_compact_primitives`](Builder::build_compact_primitives) | [`CompactBvh8`](crate::layout::CompactBvh8), [`CompactBvh4`](crate::layout::CompactBvh4) |
+//! | the same, or a mesh, from a binary tree of your own | [`build_from_tree`](Builder::build_from_tree), [`build_primitives_from_tree`](Builder::build_primitives_from_tree) | as above |
 //!
-//! `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
-//!
-//! 1. `morton`: the primitives along a curve.
-//! 2. `runs`: leaves of what follows each other.
-//! 3. `ploc`: the binary tree over leaves, from the bottom up.
-//! 4. `leaf_collapse`: as 4 above; then the walk of `emit`.
-//!
-//! `refit` makes boxes anew when primitives have moved.
-//!
-//! But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses
-//! deeper than a bound, whatever the tree. `monitor` is told of all that takes long.
+//! How much time a build may take is its [`Preset`]; what moves can be [`refit`](crate::layout::Bvh::refit); a [`Monitor`] shows
+//! progress and cancels. With the feature `rayon` builds take the threads of the current pool, one that a
+//! `rayon::ThreadPool::install` around the call has chosen, say; the hierarchy is the same.
+
+// How it is done: from primitives to a binary tree, from there to wide nodes.
+//
+// 1. `refs`: every primitive of the `input` is looked at; its box and its number.
+// 2. `spatial`, for large triangles, some of which become `pieces`, by `clip`; then `binned`, by `split` and
+//    `sweep`: the binary tree, from the top down. Or `adopt`: a caller's.
+// 3. `reinsertion`: subtrees are moved to where they cost least.
+// 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`; `cuts`, how.
+// 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
+// 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
+//
+// `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
+//
+// 1. `morton`: the primitives along a curve.
+// 2. `runs`: leaves of what follows each other.
+// 3. `ploc`: the binary tree over leaves, from the bottom up.
+// 4. `leaf_collapse`: as 4 above; then the walk of `emit`.
+//
+// `refit` makes boxes anew when primitives have moved.
+//
+// But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses
+// deeper than a bound, whatever the tree. `monitor` is told of all that takes long.
 
 mod adopt;
 mod binary;

@@ -15,7 +15,7 @@ pub trait Monitor: Sync {
     ///
     /// Called from one thread at a time, every few milliseconds or more often. With feature `rayon` it may be
     /// any thread.
-    /// [`ControlFlow::Break`] has the build end with [`BuildError::Cancelled`].
+    /// The last is 1. [`ControlFlow::Break`] has the build end with [`BuildError::Cancelled`], at any time.
     fn progress(&self, fraction: f32) -> ControlFlow<()>;
 }
 

@@ -11,7 +11,7 @@
 /// | [`Balanced`](Self::Balanced) | 380 to 500 | 0.94 |
 /// | [`Best`](Self::Best) | 1,120 to 1,540 | 1 |
 ///
-/// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100.
+/// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {

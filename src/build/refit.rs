@@ -25,8 +25,22 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
     /// again. Pieces of triangles that the builder cut get the box of the whole triangle, so for what moves
     /// [`Preset::Balanced`](super::Preset::Balanced) or [`splits(0.0)`](super::Builder::splits) is the better start.
     ///
-    /// Triangles that lose their area are not hit, and are again when they regain it. Vertices at one place may part,
-    /// if the leaf that they are in has room for them.
+    /// Triangles that lose their area are not hit, and are again when they regain it. Corners of several triangles that were
+    /// at one place when this was built may part only as long as each leaf has no more than 8 places. Meshes in which each
+    /// triangle has vertices of its own come apart so when pieces of them move by themselves: these are to be built again.
+    ///
+    /// ```
+    /// use wide_bvh::{Builder, Preset, Ray, TriangleMesh};
+    ///
+    /// let mut positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+    /// let indices = [[0, 1, 2_u32]];
+    /// let mut bvh = Builder::preset(Preset::Balanced).build(&TriangleMesh::new(&positions, &indices)?)?;
+    /// positions.iter_mut().for_each(|[_, _, z]| *z += 1.0);
+    /// bvh.refit(&TriangleMesh::new(&positions, &indices)?)?;
+    /// let hit = bvh.closest_hit(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])).unwrap();
+    /// assert_eq!(hit.t, 6.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// The hierarchy is then as it was.

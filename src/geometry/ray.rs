@@ -33,7 +33,8 @@ impl Ray {
         }
     }
 
-    /// The straight line between two points: `t` is 0 at `from` and 1 at `to`.
+    /// The straight line between two points: `t` is 0 at `from` and 1 at `to`, and both are part of it. Of one that starts or
+    /// ends on a surface see [`Hit`](super::Hit).
     #[inline]
     pub fn segment(from: impl Into<Vec3>, to: impl Into<Vec3>) -> Self {
         let from = from.into();
