@@ -2,14 +2,14 @@
 
 /// What a hierarchy is built for: once and traced for long, or anew for every picture.
 ///
-/// The answers are the same. On one thread of an AMD EPYC (Zen 5) server, over a scan of 70,000 triangles, one of 870,000,
+/// The answers are the same. On one thread of an AMD EPYC (Zen 4) server, over a scan of 70,000 triangles, one of 870,000,
 /// a kitchen and three game levels:
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 63 to 100 | 0.78 |
-/// | [`Balanced`](Self::Balanced) | 380 to 500 | 0.94 |
-/// | [`Best`](Self::Best) | 1,120 to 1,540 | 1 |
+/// | [`Fast`](Self::Fast) | 63 to 96 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 380 to 510 | 0.94 |
+/// | [`Best`](Self::Best) | 1,130 to 1,580 | 1 |
 ///
 /// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
