@@ -7,9 +7,9 @@ use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{
-        Aligned, Borrowed, Bvh, Bvh4, Bvh8, BytesError, CompactBvh4, CompactBvh8, CompactNode4,
-        CompactNode8, InBytes, LayoutError, MeshBvh4, MeshBvh8, MeshLeaf, Node4, Node8, Open,
-        PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, bytes::seal,
+        AlignedBytes, Borrowed, Bvh, Bvh4, Bvh8, BytesError, CompactBvh4, CompactBvh8,
+        CompactNode4, CompactNode8, InBytes, LayoutError, MeshBvh4, MeshBvh8, MeshLeaf, Node4,
+        Node8, Open, PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, bytes::seal,
     },
 };
 
@@ -40,18 +40,12 @@ impl Scene {
 }
 
 /// Bytes where any hierarchy may be.
-fn aligned(bytes: &[u8]) -> Vec<Aligned<[u8; 64]>> {
-    let blocks = bytes.chunks(64).map(|block| {
-        let mut aligned = Aligned([0; 64]);
-        aligned.0[..block.len()].copy_from_slice(block);
-        aligned
-    });
-    blocks.collect()
+fn aligned(bytes: &[u8]) -> AlignedBytes {
+    AlignedBytes::new(bytes)
 }
 
-fn bytes_of(blocks: &[Aligned<[u8; 64]>], len: usize) -> &[u8] {
-    // SAFETY: blocks of 64 bytes without padding, and no more of them.
-    unsafe { std::slice::from_raw_parts(blocks.as_ptr().cast(), len.min(64 * blocks.len())) }
+fn bytes_of(aligned: &[u8], len: usize) -> &[u8] {
+    &aligned[..len.min(aligned.len())]
 }
 
 /// Opens what was written, and has `same` compare the two.
@@ -199,10 +193,10 @@ fn one_byte_changed() {
     let mut blocks = aligned(&bytes);
     for at in 0..bytes.len() {
         for change in [1, 0x80, 0xff] {
-            blocks[at / 64].0[at % 64] ^= change;
+            blocks[at] ^= change;
             let opened = MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len()));
             assert!(opened.is_err(), "byte {at} changed by {change:#x}");
-            blocks[at / 64].0[at % 64] ^= change;
+            blocks[at] ^= change;
         }
     }
     assert!(MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len())).is_ok());
@@ -313,6 +307,26 @@ fn what_is_wrong_is_said() {
             error::<Node8, TriangleLeaf>(shifted),
             Some(BytesError::Misaligned { needed: 64 })
         );
+    }
+}
+
+/// What was opened can be kept without the bytes, and refitted.
+#[test]
+fn opened_and_owned() {
+    let scene = Scene::new(100);
+    let mut moved = scene.positions.clone();
+    moved.iter_mut().for_each(|[x, ..]| *x += 1.0);
+    let moved = TriangleMesh::new(&moved, &scene.indices).unwrap();
+    let builder = Builder::preset(Preset::Balanced);
+    let mut built = builder.build(&scene.mesh()).unwrap();
+    let bytes = aligned(&built.to_bytes().unwrap());
+    let opened = Bvh::<Node8, TriangleLeaf, Borrowed>::from_bytes(&bytes).unwrap();
+    let mut owned = opened.into_owned();
+    drop(bytes);
+    built.refit(&moved).unwrap();
+    owned.refit(&moved).unwrap();
+    for ray in &scene.rays {
+        assert_eq!(bits(owned.closest_hit(ray)), bits(built.closest_hit(ray)));
     }
 }
 

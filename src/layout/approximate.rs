@@ -47,6 +47,11 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
         L::borrowed::<S>(store)
     }
 
+    #[cfg(feature = "alloc")]
+    fn owned<S: Storage>(store: &L::Store<S>) -> L::Store<super::Owned> {
+        L::owned::<S>(store)
+    }
+
     fn bytes<S: Storage>(store: &L::Store<S>) -> usize {
         L::bytes::<S>(store)
     }

@@ -192,6 +192,22 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         self.with_leaves(L::borrowed::<S>(&self.leaves))
     }
 
+    /// The same hierarchy in memory of its own: one that was opened from bytes, to be kept without them, or
+    /// [refitted](Bvh::refit).
+    #[cfg(feature = "alloc")]
+    pub fn into_owned(self) -> Bvh<N, L, super::Owned> {
+        Bvh {
+            nodes: self.nodes.to_vec(),
+            leaves: L::owned::<S>(&self.leaves),
+            primitives: self.primitives.to_vec(),
+            numbers: self.numbers,
+            root: self.root,
+            bounds: self.bounds,
+            backend: self.backend,
+            dropped: self.dropped,
+        }
+    }
+
     /// How many bytes nodes, leaves and primitive numbers take: what there is beside the primitives, or the mesh, of a
     /// caller.
     pub fn bytes(&self) -> usize {

@@ -41,6 +41,10 @@ pub trait Leaves: Sized {
     /// The same, borrowed.
     #[doc(hidden)]
     fn borrowed<S: Storage>(store: &Self::Store<S>) -> Self::Store<Borrowed<'_>>;
+    /// The same, in memory of their own.
+    #[cfg(feature = "alloc")]
+    #[doc(hidden)]
+    fn owned<S: Storage>(store: &Self::Store<S>) -> Self::Store<super::Owned>;
     /// How many bytes they take.
     #[doc(hidden)]
     fn bytes<S: Storage>(store: &Self::Store<S>) -> usize;
@@ -86,6 +90,11 @@ impl<L: Leaf> Leaves for L {
 
     fn borrowed<S: Storage>(store: &S::Slice<L>) -> &[L] {
         store
+    }
+
+    #[cfg(feature = "alloc")]
+    fn owned<S: Storage>(store: &S::Slice<L>) -> alloc::vec::Vec<L> {
+        store.to_vec()
     }
 
     fn bytes<S: Storage>(store: &S::Slice<L>) -> usize {

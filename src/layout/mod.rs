@@ -22,6 +22,8 @@ pub use bvh::{
 };
 #[cfg(feature = "alloc")]
 pub use bvh::{Bvh4, Bvh8, CompactBvh4, CompactBvh8, PrimitiveBvh4, PrimitiveBvh8};
+#[cfg(feature = "alloc")]
+pub use bytes::AlignedBytes;
 pub use bytes::{Aligned, BytesError, InBytes, Open};
 pub use check::LayoutError;
 pub(crate) use check::STACK;

@@ -93,6 +93,11 @@ impl<M: Copy + Numbered> Leaves for Runs<M> {
         *of
     }
 
+    #[cfg(feature = "alloc")]
+    fn owned<S: Storage>(of: &M) -> M {
+        *of
+    }
+
     fn bytes<S: Storage>(_: &M) -> usize {
         0
     }

@@ -1,6 +1,5 @@
 //! `lab` measures wide-bvh: its speed beside other kernels, and whether each of them is right.
 
-mod aligned;
 mod corrupt;
 mod effort;
 mod engines;

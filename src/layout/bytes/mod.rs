@@ -12,10 +12,14 @@
 //! | positions | of a mesh's vertices, 12 bytes each; none without a mesh |
 //! | indices | three corners of 4 bytes each, as places of positions |
 
+mod aligned;
 mod checksum;
 mod error;
 mod header;
 
+pub use aligned::Aligned;
+#[cfg(feature = "alloc")]
+pub use aligned::AlignedBytes;
 pub use checksum::seal;
 pub use error::BytesError;
 pub use header::Header;
@@ -24,18 +28,6 @@ pub(super) use header::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES};
 use super::{Borrowed, Bvh, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode};
 use crate::geometry::TriangleMesh;
 use bytemuck::{Pod, cast_slice};
-
-/// Bytes that start at a multiple of 64, as [`from_bytes`](Bvh::from_bytes) may want: around an `include_bytes!`, say.
-///
-/// ```
-/// use wide_bvh::layout::Aligned;
-///
-/// static SCENE: &Aligned<[u8]> = &Aligned(*b"what include_bytes! gives");
-/// assert!(SCENE.0.as_ptr().cast::<[u128; 4]>().is_aligned());
-/// ```
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub struct Aligned<T: ?Sized>(pub T);
 
 /// Every section starts at a multiple of this, of bytes from the first.
 pub const ALIGN: usize = 64;
@@ -129,7 +121,7 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
     /// and are then traversed as any hierarchy is.
     ///
     /// They are to start at a multiple of 4 bytes for compact nodes, of 64 for nodes over triangles, of 16 and 32 for 4- and
-    /// 8-wide nodes over a caller's primitives. What maps a file or allocates pages gives that; see also [`Aligned`].
+    /// 8-wide nodes over a caller's primitives. What maps a file or allocates pages gives that; see also [`Aligned`] and `AlignedBytes`.
     ///
     /// # Errors
     /// Whatever else than a whole file of this version, machine and kind, unharmed: what is wrong with it and where.

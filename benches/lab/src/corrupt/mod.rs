@@ -2,7 +2,7 @@
 
 mod opened;
 
-use crate::{aligned::AlignedBytes, stress::hash, text::align};
+use crate::{stress::hash, text::align};
 use fastrand::Rng;
 use glam::Vec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,7 +19,10 @@ use std::{
 };
 use wide_bvh::{
     geometry::{Aabb, Hit, Ray},
-    layout::bytes::{Header, seal},
+    layout::{
+        AlignedBytes,
+        bytes::{Header, seal},
+    },
     simd::Backend,
 };
 

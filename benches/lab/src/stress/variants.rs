@@ -4,13 +4,12 @@
 //! [`ask`] by kinds of call. What is opened from bytes has to answer as what was written.
 
 use super::flush::flushed;
-use crate::aligned::AlignedBytes;
 use wide_bvh::{
     build::{BinaryTree, BuildError, Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{
-        Borrowed, Bvh, CompactNode4, CompactNode8, InBytes, MeshLeaf, Node4, Node8, Open, Owned,
-        RunLeaf, Storage, TriangleLeaf, TriangleLeaves, WideNode,
+        AlignedBytes, Borrowed, Bvh, CompactNode4, CompactNode8, InBytes, MeshLeaf, Node4, Node8,
+        Open, Owned, RunLeaf, Storage, TriangleLeaf, TriangleLeaves, WideNode,
     },
     simd::Backend,
     traverse::Scratch,
