@@ -22,6 +22,9 @@ pub(super) fn clip(corners: [Vec3; 3], aabb: &Aabb) -> Option<Aabb> {
         polygon.keep_above(axis, min[axis], 1.0);
         polygon.keep_above(axis, max[axis], -1.0);
     }
+    if polygon.overflowed {
+        return Some(*aabb);
+    }
     let (low, high) = polygon.bounds();
     let (low, high) = (low - margin, high + margin);
     let around = Aabb::new(
@@ -45,13 +48,19 @@ fn round_down(x: f64) -> f32 {
 struct Polygon {
     corners: [DVec3; 3 + 6],
     len: usize,
+    /// Whether there are more: what is convex but for rounding could have some.
+    overflowed: bool,
 }
 
 impl Polygon {
     fn new([a, b, c]: [DVec3; 3]) -> Self {
         let mut corners = [DVec3::ZERO; _];
         corners[..3].copy_from_slice(&[a, b, c]);
-        Self { corners, len: 3 }
+        Self {
+            corners,
+            len: 3,
+            overflowed: false,
+        }
     }
 
     /// Cuts off what has `sign` times the coordinate below `sign` times `bound` (Sutherland and Hodgman 1974).
@@ -64,6 +73,7 @@ impl Polygon {
         let mut kept = Self {
             corners: [DVec3::ZERO; _],
             len: 0,
+            overflowed: self.overflowed,
         };
         for (index, &to) in corners.iter().enumerate() {
             let from = corners[index.checked_sub(1).unwrap_or(corners.len() - 1)];
@@ -82,10 +92,12 @@ impl Polygon {
     }
 
     fn push(&mut self, corner: DVec3) {
-        // What is convex but for rounding could have a corner more.
-        if self.len < self.corners.len() {
-            self.corners[self.len] = corner;
-            self.len += 1;
+        match self.corners.get_mut(self.len) {
+            Some(place) => {
+                *place = corner;
+                self.len += 1;
+            }
+            None => self.overflowed = true,
         }
     }
 
