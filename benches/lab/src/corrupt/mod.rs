@@ -246,7 +246,7 @@ fn kind(error: &impl std::fmt::Debug) -> String {
     let name = text[..end].trim_end_matches(|c: char| !c.is_ascii_alphabetic());
     match name.split_once('(') {
         Some((outer, inner)) if outer == inner => outer.to_owned(),
-        _ => name.replace('(', " "),
+        _ => name.replace("(\"", " ").replace('(', " "),
     }
 }
 
