@@ -39,15 +39,6 @@ impl Scene {
     }
 }
 
-/// Bytes where any hierarchy may be.
-fn aligned(bytes: &[u8]) -> AlignedBytes {
-    AlignedBytes::new(bytes)
-}
-
-fn bytes_of(aligned: &[u8], len: usize) -> &[u8] {
-    &aligned[..len.min(aligned.len())]
-}
-
 /// Opens what was written, and has `same` compare the two.
 fn there_and_back<N: WideNode, L: InBytes, S: Storage>(
     bvh: &Bvh<N, L, S>,
@@ -55,7 +46,7 @@ fn there_and_back<N: WideNode, L: InBytes, S: Storage>(
 ) -> Vec<u8> {
     let bytes = bvh.to_bytes().unwrap();
     assert_eq!(bytes.len() % 64, 0);
-    same(bytes_of(&aligned(&bytes), bytes.len()));
+    same(&AlignedBytes::new(&bytes));
     bytes
 }
 
@@ -190,16 +181,16 @@ fn small() -> (Scene, Vec<u8>) {
 #[test]
 fn one_byte_changed() {
     let (_, bytes) = small();
-    let mut blocks = aligned(&bytes);
+    let mut blocks = AlignedBytes::new(&bytes);
     for at in 0..bytes.len() {
         for change in [1, 0x80, 0xff] {
             blocks[at] ^= change;
-            let opened = MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len()));
+            let opened = MeshBvh4::from_bytes(&blocks);
             assert!(opened.is_err(), "byte {at} changed by {change:#x}");
             blocks[at] ^= change;
         }
     }
-    assert!(MeshBvh4::from_bytes(bytes_of(&blocks, bytes.len())).is_ok());
+    assert!(MeshBvh4::from_bytes(&blocks).is_ok());
 }
 
 /// What is changed and sealed again is no accident. It is opened or not, and if it is, it answers.
@@ -212,7 +203,7 @@ fn one_byte_changed_and_sealed() {
             let mut changed = bytes.clone();
             changed[at] ^= change;
             seal(&mut changed);
-            match MeshBvh4::from_bytes(bytes_of(&aligned(&changed), changed.len())) {
+            match MeshBvh4::from_bytes(&AlignedBytes::new(&changed)) {
                 Ok(bvh) => {
                     opened += 1;
                     for ray in &scene.rays {
@@ -229,13 +220,13 @@ fn one_byte_changed_and_sealed() {
 #[test]
 fn cut_off() {
     let (_, bytes) = small();
-    let blocks = aligned(&bytes);
+    let blocks = AlignedBytes::new(&bytes);
     for len in 0..bytes.len() {
-        assert!(MeshBvh4::from_bytes(bytes_of(&blocks, len)).is_err());
+        assert!(MeshBvh4::from_bytes(&blocks[..len]).is_err());
     }
     let longer = [bytes.as_slice(), &[0; 64]].concat();
-    let blocks = aligned(&longer);
-    let opened = MeshBvh4::from_bytes(bytes_of(&blocks, longer.len()));
+    let blocks = AlignedBytes::new(&longer);
+    let opened = MeshBvh4::from_bytes(&blocks);
     assert_eq!(
         opened.err(),
         Some(BytesError::Length {
@@ -252,8 +243,8 @@ fn error<'a, N: WideNode, L: Open<'a>>(bytes: &'a [u8]) -> Option<BytesError> {
 #[test]
 fn what_is_wrong_is_said() {
     let (scene, bytes) = small();
-    let blocks = aligned(&bytes);
-    let whole = bytes_of(&blocks, bytes.len());
+    let blocks = AlignedBytes::new(&bytes);
+    let whole: &[u8] = &blocks;
     assert_eq!(
         error::<CompactNode8, RunLeaf>(whole),
         Some(BytesError::Nodes {
@@ -276,8 +267,8 @@ fn what_is_wrong_is_said() {
         let mut changed = bytes.clone();
         changed[at..at + to.len()].copy_from_slice(to);
         seal(&mut changed);
-        let blocks = aligned(&changed);
-        error::<CompactNode4, MeshLeaf>(bytes_of(&blocks, changed.len()))
+        let blocks = AlignedBytes::new(&changed);
+        error::<CompactNode4, MeshLeaf>(&blocks)
     };
     assert_eq!(changed(0, b"x"), Some(BytesError::NotAHierarchy));
     // The byte order's mark, as the other kind of machine writes it.
@@ -291,7 +282,7 @@ fn what_is_wrong_is_said() {
     let compact: CompactBvh4 = Builder::new().build_compact(&scene.mesh()).unwrap();
     let tree = compact.to_bytes().unwrap();
     assert!(matches!(
-        error::<CompactNode4, MeshLeaf>(bytes_of(&aligned(&tree), tree.len())),
+        error::<CompactNode4, MeshLeaf>(&AlignedBytes::new(&tree)),
         Some(BytesError::MeshTooSmall(small)) if small.triangles == 0 && small.needed == 20
     ));
     // A full hierarchy has to be where its leaves may be.
@@ -301,8 +292,8 @@ fn what_is_wrong_is_said() {
         .to_bytes()
         .unwrap();
     for shift in [1, 4, 32] {
-        let blocks = aligned(&[&[0; 64][..shift], full.as_slice()].concat());
-        let shifted = &bytes_of(&blocks, full.len() + shift)[shift..];
+        let blocks = AlignedBytes::new(&[&[0; 64][..shift], full.as_slice()].concat());
+        let shifted = &blocks[shift..];
         assert_eq!(
             error::<Node8, TriangleLeaf>(shifted),
             Some(BytesError::Misaligned { needed: 64 })
@@ -319,7 +310,7 @@ fn opened_and_owned() {
     let moved = TriangleMesh::new(&moved, &scene.indices).unwrap();
     let builder = Builder::preset(Preset::Balanced);
     let mut built = builder.build(&scene.mesh()).unwrap();
-    let bytes = aligned(&built.to_bytes().unwrap());
+    let bytes = AlignedBytes::new(&built.to_bytes().unwrap());
     let opened = Bvh::<Node8, TriangleLeaf, Borrowed>::from_bytes(&bytes).unwrap();
     let mut owned = opened.into_owned();
     drop(bytes);
@@ -345,12 +336,12 @@ fn what_is_not_there_is_not_counted() {
     let (full, runs) = (full.to_bytes().unwrap(), runs.to_bytes().unwrap());
     for (place, field) in [(36, "positions"), (40, "triangles"), (127, "reserved")] {
         let bytes = changed(&full, place);
-        let opened = error::<Node8, TriangleLeaf>(bytes_of(&aligned(&bytes), bytes.len()));
+        let opened = error::<Node8, TriangleLeaf>(&AlignedBytes::new(&bytes));
         assert_eq!(opened, Some(BytesError::NotZero(field)));
     }
     for (place, field) in [(28, "leaves"), (76, "reserved")] {
         let bytes = changed(&runs, place);
-        let opened = error::<CompactNode8, RunLeaf>(bytes_of(&aligned(&bytes), bytes.len()));
+        let opened = error::<CompactNode8, RunLeaf>(&AlignedBytes::new(&bytes));
         assert_eq!(opened, Some(BytesError::NotZero(field)));
     }
 }

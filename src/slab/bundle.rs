@@ -5,7 +5,8 @@
 //! the least of each is where the first of the rays may meet the plane, rounding seen to as in the [parent](super):
 //! from (2) there, 7u·D·|r| and 1u·D·|r| for the reciprocal; 2u·D·|r| for p - c and its product; 4u·D·|r| for o - c, at most
 //! 2·D, and its product; 2u·D·|r| and u·E each for the sum with E and the last one: 18u·D·|r| + 3u·E, D being that of all the
-//! rays together. **K_BUNDLE = 24** leaves 6, and (3) needs 2 where reciprocals were cut off. That the least product is at an end holds after rounding, for rounding is monotone.
+//! rays together. **K_BUNDLE = 24** leaves 6, and (3) needs 2 where reciprocals were cut off. That the least product is at
+//! an end holds after rounding, for rounding is monotone.
 //!
 //! Interval arithmetic over a bundle: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005); Wald et al.,
 //! "Ray tracing deformable scenes using dynamic bounding volume hierarchies" (2007).

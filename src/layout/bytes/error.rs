@@ -1,5 +1,6 @@
 //! What is wrong with bytes.
 
+use super::header::{PRIMITIVE_LEAVES, RUNS, TRIANGLE_LEAVES};
 use crate::{
     geometry::MeshError,
     layout::{LayoutError, MeshTooSmall},
@@ -124,9 +125,9 @@ fn nodes(kind: u32) -> &'static str {
 /// A kind of leaves for people.
 fn leaves(kind: u32) -> &'static str {
     match kind {
-        1 => "triangles",
-        2 => "a caller's primitives",
-        3 => "primitive numbers alone",
+        TRIANGLE_LEAVES => "triangles",
+        PRIMITIVE_LEAVES => "a caller's primitives",
+        RUNS => "primitive numbers alone",
         _ => "an unknown kind",
     }
 }

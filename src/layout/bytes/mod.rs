@@ -25,7 +25,9 @@ pub use error::BytesError;
 pub use header::Header;
 pub(super) use header::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES};
 
-use super::{Borrowed, Bvh, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode};
+use super::{
+    Borrowed, Bvh, LayoutError, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode,
+};
 use crate::geometry::TriangleMesh;
 use bytemuck::{Pod, cast_slice};
 
@@ -121,7 +123,8 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
     /// and are then traversed as any hierarchy is.
     ///
     /// They are to start at a multiple of 4 bytes for compact nodes, of 64 for nodes over triangles, of 16 and 32 for 4- and
-    /// 8-wide nodes over a caller's primitives. What maps a file or allocates pages gives that; see also [`Aligned`] and `AlignedBytes`.
+    /// 8-wide nodes over a caller's primitives. What maps a file or allocates pages gives that; see also [`Aligned`] and
+    /// `AlignedBytes`.
     ///
     /// # Errors
     /// Whatever else than a whole file of this version, machine and kind, unharmed: what is wrong with it and where.
@@ -140,14 +143,16 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
             cast(&bytes[indices])?,
         )?;
         let primitives = cast(&bytes[primitives])?;
-        if let Some(triangles) = L::known::<Borrowed>(&store) {
-            let needed = L::numbers(primitives);
-            if needed > triangles as u64 {
-                return Err(MeshTooSmall { triangles, needed }.into());
+        let known = L::known::<Borrowed>(&store);
+        let bvh = Self::from_parts(cast(&bytes[nodes])?, store, primitives, header.bounds());
+        match (bvh, known) {
+            (Ok(bvh), _) => Ok(bvh.with_dropped(header.dropped)),
+            (Err(LayoutError::Primitive(_)), Some(triangles)) => {
+                let needed = L::numbers(primitives);
+                Err(MeshTooSmall { triangles, needed }.into())
             }
+            (Err(error), _) => Err(error.into()),
         }
-        let bvh = Self::from_parts(cast(&bytes[nodes])?, store, primitives, header.bounds())?;
-        Ok(bvh.with_dropped(header.dropped))
     }
 }
 
