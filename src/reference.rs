@@ -5,10 +5,10 @@
 
 use crate::{
     geometry::{Hit, Ray, TriangleMesh, is_degenerate},
-    primitive::{PrimitiveHit, Primitives, custom},
+    primitive::{PrimitiveHit, Primitives, custom, exact::reciprocal64},
     slab::{PreparedRay, pow2},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3, dvec3};
 
 /// The closest hit on a mesh: of all triangles that are hit within the ray's range the one of least `t`,
 /// of equal ones the one of least number. Triangles with a corner that is NaN or infinite are never hit, nor
@@ -75,8 +75,8 @@ fn triangles(mesh: &TriangleMesh) -> impl Iterator<Item = [Vec3; 3]> {
 ///
 /// The formulas are those of the triangle test, a number at a time; the signs of the edge functions are
 /// found in `f64` without exception.
-fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]> {
-    if !corners.iter().all(|corner| corner.is_finite()) {
+fn intersect_triangle(ray: &PreparedRay, vertices: [Vec3; 3]) -> Option<[f32; 3]> {
+    if !vertices.iter().all(|vertex| vertex.is_finite()) {
         return None;
     }
     let [kx, ky, kz] = *ray.axes;
@@ -87,7 +87,7 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
         t_max,
     } = *ray.ray;
     let reciprocal = 1.0 / direction[kz];
-    let [a, b, c] = corners.map(|corner| corner - origin);
+    let [a, b, c] = vertices.map(|vertex| vertex - origin);
     let shear = [direction[kx] * reciprocal, direction[ky] * reciprocal];
     let shear = |p: Vec3| [p[kx] - shear[0] * p[kz], p[ky] - shear[1] * p[kz]];
     let ([ax, ay], [bx, by], [cx, cy]) = (shear(a), shear(b), shear(c));
@@ -100,46 +100,80 @@ fn intersect_triangle(ray: &PreparedRay, corners: [Vec3; 3]) -> Option<[f32; 3]>
         return None;
     }
 
-    let cross64 = |px: f32, py: f32, qx: f32, qy: f32| {
-        f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)
-    };
-    let [wa, wb, wc] = [
-        cross64(cx, cy, bx, by),
-        cross64(ax, ay, cx, cy),
-        cross64(bx, by, ax, ay),
+    // The signs of the edge functions are exact.
+    let dz = f64::from(direction[kz]);
+    let widen = |p: [f32; 2], z: f32| dvec3(p[0].into(), p[1].into(), z.into());
+    let corners = [
+        widen([ax, ay], a[kz]),
+        widen([bx, by], b[kz]),
+        widen([cx, cy], c[kz]),
     ];
-    let determinant = wa + wb + wc;
-    let inside = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
-    if !inside || determinant == 0.0 || !determinant.is_finite() {
-        return None;
-    }
-    let exact = [(wb / determinant) as f32, (wc / determinant) as f32];
+    let sheared = solve(corners, dz, 0.0)?;
 
-    // The weights of `f32`, where they are well-conditioned, and nothing vanishes, overflows or gets near to either.
+    // `f32`, where it is well-conditioned, and nothing vanishes, overflows or gets near to either.
+    let unit = pow2(-24);
     let cross32 = |px: f32, py: f32, qx: f32, qy: f32| px * qy - py * qx;
-    let [wa, wb, wc] = [
+    let [xa, xb, xc] = [
         cross32(cx, cy, bx, by),
         cross32(ax, ay, cx, cy),
         cross32(bx, by, ax, ay),
     ];
-    let determinant = wa + wb + wc;
-    let size = determinant.abs();
+    let sum = xa + xb + xc;
+    let size = sum.abs();
     let (ab, ac) = (b[kz] - a[kz], c[kz] - a[kz]);
     let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
     let extent_y = ay.abs().max(by.abs()).max(cy.abs());
-    let ordinary = wa != 0.0
-        && wb != 0.0
-        && wc != 0.0
-        && size > pow2(-100)
-        && size < pow2(126)
-        && extent_x / size * extent_y * ab.abs().max(ac.abs()) <= a[kz].abs() * 2.0;
-    let [u, v] = if ordinary {
-        [wb / determinant, wc / determinant]
+    let [u, v] = [xb / sum, xc / sum];
+    let z = a[kz] + u * ab + v * ac;
+    let depth = ab.abs().max(ac.abs());
+    let spread = extent_x * extent_y + extent_x.max(extent_y) * (a[kz].abs() * 0.5);
+    let doubt = (spread / size + 1.0) * depth;
+    let sound = xa != 0.0 && xb != 0.0 && xc != 0.0 && size > pow2(-100) && size < pow2(126);
+    let [t, u, v] = if sound && doubt <= z.abs() * 16.0 {
+        [z * reciprocal, u, v]
     } else {
-        exact
+        // In `f64`: of the triangle as given, if the ray meets it, and about there; else of the sheared one.
+        let error = (doubt + a[kz].abs()) * (reciprocal.abs() * (32.0 * unit));
+        let is_there =
+            |t: f32| !sound || error == f32::INFINITY || (t - z * reciprocal).abs() <= error;
+        let [o, d] = [origin, direction].map(Vec3::as_dvec3);
+        let exactly = vertices.map(|vertex| {
+            let p = vertex.as_dvec3() - o;
+            dvec3(
+                p[kx] * dz - d[kx] * p[kz],
+                p[ky] * dz - d[ky] * p[kz],
+                p[kz],
+            )
+        });
+        solve(exactly, dz, unit.into())
+            .filter(|&[t, ..]| is_there(t))
+            .unwrap_or(sheared)
     };
 
-    let z = a[kz] + u * ab + v * ac;
-    let t = z * reciprocal + 0.0;
+    let t = t + 0.0;
     (t.is_finite() && t_min <= t && t <= t_max).then_some([t, u + 0.0, v + 0.0])
+}
+
+/// `t`, `u` and `v` where 0 is in a sheared triangle, if it is, and the triangle's area is not less than `least` of what it
+/// is the difference of.
+fn solve([a, b, c]: [DVec3; 3], dz: f64, least: f64) -> Option<[f32; 3]> {
+    let products = [
+        [c.x * b.y, c.y * b.x],
+        [a.x * c.y, a.y * c.x],
+        [b.x * a.y, b.y * a.x],
+    ];
+    let [wa, wb, wc] = products.map(|[p, q]| p - q);
+    let largest = products
+        .as_flattened()
+        .iter()
+        .fold(0.0_f64, |most, p| most.max(p.abs()));
+    let area = wa + wb + wc;
+    let inside = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
+    if !inside || area == 0.0 || !area.is_finite() || area.abs() < largest * least {
+        return None;
+    }
+    let z = wa * a.z + wb * b.z + wc * c.z;
+    let scale = reciprocal64(area * dz);
+    let [t, u, v] = [z * scale, wb * (scale * dz), wc * (scale * dz)];
+    Some([t as f32, u as f32, v as f32])
 }

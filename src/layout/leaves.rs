@@ -2,7 +2,10 @@
 
 use super::{Borrowed, LayoutError, Leaf, Storage, TriangleLeaf};
 use crate::{
-    primitive::triangle::{Along, Corners, Edges, Precision, RayShear, TriangleHits},
+    primitive::{
+        exact::{Pair, Pairs},
+        triangle::{Corners, Edges, Precision, RayShear, TriangleHits},
+    },
     simd::{Lanes, Simd},
 };
 use core::ops::Range;
@@ -173,19 +176,33 @@ pub trait Triangles: Copy {
             return None;
         }
         let t_max = T::F32x8::splat(token, t_max);
-        Self::hits::<T, NEED_T>(token, &ray.along(token), corners, edges, t_max)
+        self.hits::<T, NEED_T>(token, ray, corners, edges, t_max)
     }
 
-    /// The rest of the test, which may as well be of rays and one triangle.
+    /// The rest of the test.
     #[inline(always)]
     fn hits<T: Simd, const NEED_T: bool>(
+        self,
         token: T,
-        along: &Along<T::F32x8>,
+        ray: &RayShear<'_, T::F32x8>,
         corners: Corners<T::F32x8>,
         edges: Edges<T::F32x8>,
         t_max: T::F32x8,
     ) -> Option<TriangleHits<T::F32x8>> {
-        along.test::<8, NEED_T, Self::Precision>(token, corners, edges, t_max)
+        let pairs = OneRay(self, ray);
+        (ray.along(token))
+            .test::<8, NEED_T, Self::Precision, _>(token, corners, edges, t_max, pairs)
+    }
+}
+
+/// A ray against all triangles of a leaf.
+#[derive(Clone, Copy)]
+struct OneRay<'a, R, V>(R, &'a RayShear<'a, V>);
+
+impl<R: Triangles, V: Copy> Pairs for OneRay<'_, R, V> {
+    #[inline(always)]
+    fn pair(&self, lane: usize) -> Pair {
+        self.1.pair(&self.0.triangle(lane))
     }
 }
 

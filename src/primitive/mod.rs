@@ -2,6 +2,7 @@
 
 mod cuboid;
 pub(crate) mod custom;
+pub(crate) mod exact;
 mod sphere;
 pub(crate) mod triangle;
 

@@ -8,12 +8,13 @@
 //!   monotone, so the rounded products compare as the exact ones do or come out equal. A lane that comes out
 //!   zero, or overflows, is worked out again in `f64`, where the products are exact. So the sign is exact,
 //!   and the sheared mesh has no crack at an edge or a vertex.
-//! - The weights, too, come from `f64` where those of `f32` would be ill-conditioned: on needles, and on
-//!   triangles seen nearly edge-on. So the error of `t` is bounded whatever the triangle (see
-//!   [`slab`](crate::slab)).
+//! - `t`, `u` and `v` come from `f64`, and from the triangle as given, where those of `f32` would be off by more than a few
+//!   roundings of `t`: on needles, on triangles seen nearly edge-on, and on large ones seen from near. So the error of `t`
+//!   is bounded whatever the triangle (see [`slab`](crate::slab)), and small.
 
 use core::ops::{Mul, Sub};
 
+use super::exact::{Pair, Pairs, exact_hit};
 use crate::{
     geometry::Ray,
     simd::{F32x1, Portable, Vector, splat3},
@@ -23,8 +24,8 @@ use crate::{
 /// How much of the triangle test is done.
 #[doc(hidden)]
 pub trait Precision {
-    /// Whether what `f32` leaves open is worked out in `f64`. If not, a triangle that the ray passes through an edge of,
-    /// as rounded, is hit, and its weights and `t` are those of `f32`.
+    /// Whether what `f32` leaves open, or has too roughly, is worked out in `f64`. If not, a triangle that the ray passes
+    /// through an edge of, as rounded, is hit, and its weights and `t` are those of `f32`.
     const EXACT: bool;
 }
 
@@ -188,6 +189,12 @@ impl<'a, V: Copy> RayShear<'a, V> {
         Sheared::new(vertices, origin, slope)
     }
 
+    /// The ray with a triangle.
+    #[inline(always)]
+    pub(crate) fn pair(&self, corners: &[[f32; 3]; 3]) -> Pair {
+        Pair::new(corners, self.ray, self.axes)
+    }
+
     /// What the rest of the test needs of the ray.
     #[inline(always)]
     pub(crate) fn along<const N: usize>(&self, token: V::Token) -> Along<V>
@@ -208,11 +215,11 @@ impl RayShear<'_, F32x1> {
     #[inline(never)]
     pub(crate) fn test_triangle<P: Precision>(
         &self,
-        corners: &[[f32; 3]; 3],
+        triangle: &[[f32; 3]; 3],
         t_max: f32,
     ) -> Option<[f32; 3]> {
         let token = Portable;
-        let [a, b, c] = corners;
+        let [a, b, c] = triangle;
         let (a, b, c) = (
             self.shear(token, splat3(token, *a)),
             self.shear(token, splat3(token, *b)),
@@ -224,7 +231,8 @@ impl RayShear<'_, F32x1> {
         if edges.candidates == 0 {
             return None;
         }
-        let hit = along.test::<1, true, P>(token, corners, edges, F32x1(t_max))?;
+        let pair = self.pair(triangle);
+        let hit = along.test::<1, true, P, _>(token, corners, edges, F32x1(t_max), pair)?;
         Some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
@@ -267,12 +275,13 @@ impl<V> Along<V> {
     /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`. If `NEED_T` is not
     /// set, it is enough to know whether there are any.
     #[inline(always)]
-    pub(crate) fn test<const N: usize, const NEED_T: bool, P: Precision>(
+    pub(crate) fn test<const N: usize, const NEED_T: bool, P: Precision, O: Pairs>(
         &self,
         token: V::Token,
         corners: Corners<V>,
         edges: Edges<V>,
         t_max: V,
+        pairs: O,
     ) -> Option<TriangleHits<V>>
     where
         V: Vector<N>,
@@ -291,28 +300,29 @@ impl<V> Along<V> {
         let zero = V::splat(token, 0.0);
         let reciprocal = self.reciprocal;
         let (ab, ac) = (bz - az, cz - az);
+        let (mut u, mut v) = (wb / determinant, wc / determinant);
+        let z = az + u * ab + v * ac;
+        // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
+        let mut t = z * reciprocal + zero;
         if !P::EXACT {
             let inside = (zero.le(least) | most.le(zero)) & finite & zero.lt(size);
-            let (u, v) = (wb / determinant, wc / determinant);
-            let t = (az + u * ab + v * ac) * reciprocal + zero;
             return self.within_range(token, candidates & inside.bits(), [t, u, v], t_max);
         }
         let extent_x = ax.abs().max(bx.abs()).max(cx.abs());
         let extent_y = ay.abs().max(by.abs()).max(cy.abs());
         let depth = ab.abs().max(ac.abs());
-        let doubt = extent_x / size * extent_y * depth;
+        // How far z may be off, twice over, in 2^-19 and beside its own roundings: by those of the edge functions, and,
+        // about, of the shear.
+        let spread =
+            extent_x * extent_y + extent_x.max(extent_y) * (az.abs() * V::splat(token, 0.5));
+        let doubt = (spread / size + V::splat(token, 1.0)) * depth;
         // Where the signs are certain, and nothing overflows or vanishes.
         let sound =
             (zero.lt(least) | most.lt(zero)) & finite & V::splat(token, MIN_DETERMINANT).lt(size);
-        let certain = sound & doubt.le(az.abs() * V::splat(token, CONDITION));
-        let (mut u, mut v) = (wb / determinant, wc / determinant);
-        // Adding 0 turns -0 into 0, for ties to be ties and answers to be the same everywhere.
-        let mut t = (az + u * ab + v * ac) * reciprocal + zero;
+        let certain = sound & doubt.le(z.abs() * V::splat(token, CONDITION));
 
         // How far `t` may be off, twice over: where it cannot matter, no better one is worked out.
-        let error = (doubt * V::splat(token, 32.0 * UNIT_ROUNDOFF)
-            + (az.abs() + depth) * V::splat(token, 64.0 * UNIT_ROUNDOFF))
-            * reciprocal.abs();
+        let error = (doubt + az.abs()) * (reciprocal.abs() * V::splat(token, 32.0 * UNIT_ROUNDOFF));
         let (least_t, most_t) = (t - error, t + error);
         let (t_min, infinity) = (self.t_min, V::splat(token, f32::INFINITY));
         // Where `t` has overflowed, it is not known how far it is off.
@@ -321,20 +331,35 @@ impl<V> Along<V> {
         let mut mask = candidates & certain.bits();
         if !NEED_T {
             let inside = sound & t_min.le(least_t) & most_t.le(t_max) & most_t.abs().lt(infinity);
-            if candidates & inside.bits() != 0 {
+            let mask = candidates & inside.bits();
+            if mask != 0 {
                 return Some(TriangleHits { mask, t, u, v });
             }
         }
         if mask != candidates {
-            let corners = to_arrays([ax, ay, bx, by, cx, cy]);
+            let fence = sound.select(error, infinity);
+            let (estimates, fences) = (t.to_array(), fence.to_array());
+            let sheared = [
+                [ax.to_array(), ay.to_array(), az.to_array()],
+                [bx.to_array(), by.to_array(), bz.to_array()],
+                [cx.to_array(), cy.to_array(), cz.to_array()],
+            ];
             for lane in bits(candidates & !mask) {
-                if let Some([exact_u, exact_v]) = exact_weights(&corners, lane) {
-                    u = u.replace(token, lane, exact_u);
-                    v = v.replace(token, lane, exact_v);
+                let at = lane % N;
+                let [a, b, c] = &sheared;
+                let sheared = [
+                    [a[0][at], a[1][at], a[2][at]],
+                    [b[0][at], b[1][at], b[2][at]],
+                    [c[0][at], c[1][at], c[2][at]],
+                ];
+                let hit = exact_hit(&pairs.pair(lane), sheared, estimates[at], fences[at]);
+                if let Some(hit) = hit {
+                    t = t.replace(token, lane, hit[0]);
+                    u = u.replace(token, lane, hit[1]);
+                    v = v.replace(token, lane, hit[2]);
                     mask |= 1 << lane;
                 }
             }
-            t = (az + u * ab + v * ac) * reciprocal + zero;
         }
 
         self.within_range(token, mask, [t, u, v], t_max)
@@ -362,34 +387,6 @@ impl<V> Along<V> {
             v: v + zero,
         })
     }
-}
-
-#[inline(always)]
-fn to_arrays<const N: usize, V: Vector<N>>([a, b, c, d, e, f]: [V; 6]) -> [[f32; N]; 6] {
-    [
-        a.to_array(),
-        b.to_array(),
-        c.to_array(),
-        d.to_array(),
-        e.to_array(),
-        f.to_array(),
-    ]
-}
-
-/// The weights of the second and the third corner of the triangle in a lane by the exact signs of the edge
-/// functions, or `None` for a miss. `corners` are x and y of each after the shear.
-#[inline(always)]
-fn exact_weights<const N: usize>(corners: &[[f32; N]; 6], lane: usize) -> Option<[f32; 2]> {
-    let [ax, ay, bx, by, cx, cy] = corners;
-    let at = |corner: &[f32; N]| f64::from(corner[lane % N]);
-    let (ax, ay, bx, by, cx, cy) = (at(ax), at(ay), at(bx), at(by), at(cx), at(cy));
-    let wa = cx * by - cy * bx;
-    let wb = ax * cy - ay * cx;
-    let wc = bx * ay - by * ax;
-    let inside = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
-    let determinant = wa + wb + wc;
-    (inside && determinant != 0.0 && determinant.is_finite())
-        .then(|| [(wb / determinant) as f32, (wc / determinant) as f32])
 }
 
 /// The places of the bits that are set, the lowest first.

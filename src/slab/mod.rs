@@ -12,7 +12,7 @@
 //! (for r < 0, the box's two planes change places, here and below) and the box is passed when
 //!
 //! ```text
-//! max(near, t_min - S) <= min(far, t_max + S),  S = K_T·u·D·|r.z|
+//! max(near, t_min - S(t_min)) <= min(far, t_max + S(t_max)),  S(t) = K_T·u·D·|r.z| + K_RELATIVE·u·|t|
 //! ```
 //!
 //! with z the axis of the largest direction component. Let M be the largest |vertex - o| of a triangle on
@@ -36,16 +36,24 @@
 //! 14 - 7 - 4 = 3 u·D·R = 3·2^24·D that are left of K_BOX: and |t*| <= M / |d.z| <= 2^23·D (1 + u), for d.z, the
 //! largest component, is at least 2^-23. This is why R is not smaller.
 //!
-//! *(4) The computed t is within S of t\*.* It is Z.a + v·(Z.b - Z.a) + w·(Z.c - Z.a), times r.z, of computed
-//! weights. Those of `f64` are good to 2^-50 and then rounded. In `f32`, with X and Y the largest |x'| and |y'|
-//! of the corners, an edge function is off by 2u·X·Y + u·itself, the determinant by 6u·X·Y + 3u·itself, and a weight
-//! by 8u·X·Y/|det| + 5u. They are only used where X·Y/|det|·max(|Z.b - Z.a|, |Z.c - Z.a|) <= C·|Z.a|: so the
-//! mean is off by 16u·C·M + 2·5u·2M for the weights, and less than 10u·M for its own operations: 62u·M for
-//! C = [`CONDITION`] = 2. The product adds 2u, as does t_max + S: **K_T = 66**.
+//! *(4) The computed t is within S(t) of t\*.* In `f32` it is Z.a + v·(Z.b - Z.a) + w·(Z.c - Z.a), times r.z, of computed
+//! weights. With X and Y the largest |x'| and |y'| of the corners, an edge function is off by 2u·X·Y + u·itself, the
+//! determinant by 6u·X·Y + 3u·itself, and a weight by 8u·X·Y/|det| + 5u of itself. With d the greater of |Z.b - Z.a| and
+//! |Z.c - Z.a|, and Z the mean, that and the mean's own operations come to (16·X·Y/|det| + 10)·u·d + 2u·|Z|. It is used
+//! where (X·Y/|det| + 1)·d <= C·|Z|: it is off by less than (16·C + 4)·u·|t|, the product and r.z included:
+//! **K_RELATIVE = 272** has 12 to spare for C = [`CONDITION`] = 16, for terms of u² and for the sums of S and t.
+//! Elsewhere numbers are `f64`, off by a few 2^-53, and then rounded:
 //!
-//! *The pass itself.* A hit that counts has t_min <= t <= t_max. By (4), t_min - S <= t* <= t_max + S; by (2),
-//! near <= t* <= far on each axis: t* is between the two sides of the test. It is enough that *some* box of
-//! each level holds P: boxes may hold parts of triangles.
+//! - The triangle is sheared once more. Corners are off by 2^-50·M; no weight is below 0, and as the area is at least u of
+//!   the products that it is the difference of, each weight is off by less than 2^-27. So (1) holds with 2^-24·M for
+//!   7u·M, for the P of these weights, whose z t has to 2^-50·M.
+//! - Or the corners are those of (1), the edge functions are exact but for their last rounding, and so are the weights.
+//!
+//! In both t is off by u·|t| and 2^-50·M·|r.z|: **K_T = 16** is for M and D being rounded, and to spare.
+//!
+//! *The pass itself.* A hit that counts has t_min <= t <= t_max. By (4), and as t + S(t) and t - S(t) grow with t,
+//! t_min - S(t_min) <= t* <= t_max + S(t_max); by (2), near <= t* <= far on each axis: t* is between the two sides of the
+//! test. It is enough that *some* box of each level holds P: boxes may hold parts of triangles.
 //!
 //! *(5) A caller's primitive* has no such t*. Its t is put into the interval [n, f] that the ray spends in the
 //! primitive's own box, by one fixed formula, n = (lo - o)·r - e and f = (hi - o)·r + e with
@@ -76,7 +84,7 @@ pub(crate) use prepared::{PreparedRay, pow2, reciprocals, unscaled};
 
 use crate::{
     geometry::{Aabb, Ray},
-    simd::{Vector, splat3},
+    simd::{F32x1, Portable, Vector, splat3},
 };
 use glam::Vec3;
 
@@ -85,11 +93,13 @@ pub(crate) const UNIT_ROUNDOFF: f32 = pow2(-24);
 /// Margin of the box test: derived above.
 const K_BOX: f32 = 14.0;
 /// Margin of the computed `t` of a triangle: derived above.
-const K_T: f32 = 66.0;
+const K_T: f32 = 16.0;
+/// The same of a hit, of its `t`.
+const K_RELATIVE: f32 = 272.0;
 /// Margin of a primitive's own interval: derived above.
 const K_PRIMITIVE: f32 = 6.0;
-/// How ill-conditioned a triangle's weights may be in `f32`: (4) above.
-pub(crate) const CONDITION: f32 = 2.0;
+/// How far off a triangle's `t` may be in `f32`: (4) above.
+pub(crate) const CONDITION: f32 = 16.0;
 /// No distance is taken to be smaller when errors are estimated: (6) above.
 const MIN_EXTENT: f32 = pow2(-70);
 /// Up to here nothing overflows: (6) above.
@@ -167,7 +177,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
             reciprocal,
             near: [zero; 3],
             far: [zero; 3],
-            t_min: t_min - margin,
+            t_min: t_min - (t_min.abs() * V::splat(token, K_RELATIVE * UNIT_ROUNDOFF) + margin),
             margin,
             first: [
                 first_planes(0, direction.x, Self::SIDE),
@@ -182,7 +192,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         (slabs, extent)
     }
 
-    /// How far the computed `t` of a triangle may be off: what the greatest `t` has to be raised by.
+    /// How far the computed `t` of a triangle may be off beside what [`reach`] has of `t` itself.
     #[inline(always)]
     pub(crate) fn margin(&self) -> f32 {
         self.margin.to_array()[0]
@@ -243,6 +253,18 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
 
     /// Bytes of one side's planes.
     const SIDE: usize = size_of::<[f32; N]>();
+}
+
+/// Up to which `t` boxes are of interest, where hits are up to `t_max`.
+#[inline(always)]
+pub(crate) fn reach<const N: usize, V: Vector<N>>(token: V::Token, t_max: V, margin: V) -> V {
+    t_max + (t_max.abs() * V::splat(token, K_RELATIVE * UNIT_ROUNDOFF) + margin)
+}
+
+/// The same of one number.
+#[inline(always)]
+pub(crate) fn reach_of(t_max: f32, margin: f32) -> f32 {
+    reach(Portable, F32x1(t_max), F32x1(margin)).0
 }
 
 /// Which side's planes rays of some direction meet first, by axis, in a node of `N` children: how many bytes after the

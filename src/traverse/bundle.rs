@@ -11,9 +11,12 @@ use super::{query::Query, triangles::Found};
 use crate::{
     geometry::{Aabb, Ray},
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
-    primitive::triangle::{Along, RayShear, Sheared, bits},
+    primitive::{
+        exact::{Pair, Pairs},
+        triangle::{Along, RayShear, Sheared, bits},
+    },
     simd::{Lanes, Simd, Vector, load_all, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reciprocals},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reach, reciprocals},
 };
 use core::mem::MaybeUninit;
 
@@ -349,9 +352,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
             let new = if lanes.count_ones() <= FEW {
                 packet.test_by_ray::<Q>(token, leaf, primitives, lanes, found, of_packet, axes)
             } else {
-                packet.test_leaf::<Q, _>(token, leaf, primitives, lanes, found, axes)
+                packet.test_leaf::<Q, _>(token, leaf, primitives, lanes, found, of_packet, axes)
             };
-            packet.far = packet.t_max + packet.slabs.margins();
+            packet.far = reach(token, packet.t_max, packet.slabs.margins());
             closer |= u64::from(new) << (LANES * index);
         }
         self.found |= closer;
@@ -394,7 +397,7 @@ impl<T: Simd> Packet<T> {
         let packet = Self {
             origin,
             slabs,
-            far: t_max + slabs.margins(),
+            far: reach(token, t_max, slabs.margins()),
             along: Along {
                 reciprocal: reciprocals[kz],
                 t_min,
@@ -413,6 +416,7 @@ impl<T: Simd> Packet<T> {
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     fn test_leaf<Q: Query, R: Triangles>(
         &mut self,
         token: T,
@@ -420,7 +424,8 @@ impl<T: Simd> Packet<T> {
         primitives: &[u32],
         mut lanes: u32,
         mut found: u32,
-        axes: &[usize; 3],
+        rays: &[Ray],
+        axes: &'static [usize; 3],
     ) -> u32 {
         let [kx, ky, kz] = *axes;
         // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
@@ -457,11 +462,33 @@ impl<T: Simd> Packet<T> {
                 corners
             };
             let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-            let edges = self.along.edges(token, corners, lanes);
+            let mut edges = self.along.edges(token, corners, lanes);
+            let pairs = OneTriangle {
+                triangles: leaf,
+                triangle,
+                rays,
+                axes,
+            };
+            if !Q::CLOSEST {
+                // Not all lanes that are hit at once, but some if there are any.
+                while edges.candidates != 0 {
+                    let hits = (self.along).test::<LANES, false, R::Precision, _>(
+                        token, corners, edges, self.t_max, pairs,
+                    );
+                    let Some(hits) = hits else {
+                        break;
+                    };
+                    new |= hits.mask;
+                    lanes &= !hits.mask;
+                    edges.candidates &= !hits.mask;
+                }
+                continue;
+            }
             if edges.candidates == 0 {
                 continue;
             }
-            let hits = R::hits::<T, true>(token, &self.along, corners, edges, self.t_max);
+            let hits = (self.along)
+                .test::<LANES, true, R::Precision, _>(token, corners, edges, self.t_max, pairs);
             let Some(hits) = hits else {
                 continue;
             };
@@ -480,9 +507,6 @@ impl<T: Simd> Packet<T> {
             self.places = set.select(places, self.places);
             found |= closer;
             new |= closer;
-            if !Q::CLOSEST {
-                lanes &= !closer;
-            }
         }
         new
     }
@@ -533,6 +557,24 @@ impl<T: Simd> Packet<T> {
             }
         }
         new
+    }
+}
+
+/// The rays of a packet against one triangle of a leaf.
+#[derive(Clone, Copy)]
+struct OneTriangle<'a, R> {
+    triangles: R,
+    triangle: usize,
+    rays: &'a [Ray],
+    axes: &'static [usize; 3],
+}
+
+impl<R: Triangles> Pairs for OneTriangle<'_, R> {
+    #[inline(always)]
+    fn pair(&self, lane: usize) -> Pair {
+        // Lanes past the last ray are not among those that are asked for.
+        let ray = self.rays.get(lane).unwrap_or(&PreparedRay::ROOM);
+        Pair::new(&self.triangles.triangle(self.triangle), ray, self.axes)
     }
 }
 

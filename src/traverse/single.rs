@@ -5,6 +5,7 @@ use crate::{
     geometry::Ray,
     layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
     simd::Simd,
+    slab::reach_of,
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
 
@@ -83,7 +84,7 @@ pub(super) fn walk_boxes<
 ) {
     let nodes = bvh.nodes().as_ptr();
     let margin = boxes.margin();
-    let mut t_max = t_max + margin;
+    let mut t_max = reach_of(t_max, margin);
     // Apart, so that the length stays in a register and nothing is cleared.
     let mut stack: Stack = [MaybeUninit::uninit(); STACK];
     let mut len = 0;
@@ -148,7 +149,7 @@ pub(super) fn walk_boxes<
         let leaf = unsafe { bvh.leaf(current.leaf()) };
         match visitor.leaf(leaf) {
             ControlFlow::Break(()) => return,
-            ControlFlow::Continue(t) => t_max = t + margin,
+            ControlFlow::Continue(t) => t_max = reach_of(t, margin),
         }
         match pop(&stack, &mut len, t_max) {
             Some(link) => current = link,

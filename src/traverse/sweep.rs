@@ -8,7 +8,7 @@ use crate::{
     layout::{TriangleLeaf, Triangles, WideNode},
     primitive::triangle::RayShear,
     simd::{Backend, Lanes, Operation, Simd},
-    slab::PreparedRay,
+    slab::{PreparedRay, reach_of},
 };
 
 /// How many children of `nodes`, all within `bounds`, the ray passes the boxes of. 0 for a ray that can hit nothing.
@@ -24,7 +24,8 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
             };
             let reciprocal = prepared.reciprocals(token);
             let slabs = N::slabs(token, prepared.ray, reciprocal, self.1);
-            let t_max = N::Lanes::<T>::splat(token, prepared.ray.t_max + N::margin(&slabs));
+            let t_max =
+                N::Lanes::<T>::splat(token, reach_of(prepared.ray.t_max, N::margin(&slabs)));
             let mut passed = 0;
             // No closure: it would not inherit the target's features.
             for node in self.0 {

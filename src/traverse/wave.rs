@@ -17,7 +17,7 @@ use crate::{
     layout::{Bvh, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{Corners, Edges, RayShear},
     simd::{Lanes, Simd},
-    slab::NarrowRay,
+    slab::{NarrowRay, reach_of},
 };
 use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
 
@@ -164,7 +164,7 @@ impl Lane {
             (&raw mut (*lane).narrow).write(*narrow);
             (&raw mut (*lane).current).write(root);
             (&raw mut (*lane).top).write(0);
-            (&raw mut (*lane).far).write(ray.t_max + narrow.margin());
+            (&raw mut (*lane).far).write(reach_of(ray.t_max, narrow.margin()));
             (&raw mut (*lane).t_max).write(ray.t_max);
             (&raw mut (*lane).links[0]).write(MaybeUninit::new(BOTTOM));
             (&raw mut (*lane).ray).write(*ray);
@@ -247,18 +247,18 @@ impl Lane {
         &(corners, edges): &Look<T>,
     ) {
         let t_max = T::F32x8::splat(token, self.t_max);
-        let along = self.shear(token).along(token);
+        let (leaf, shear) = (self.leaf(bvh), self.shear(token));
         if Q::CLOSEST {
-            let hits = L::Ref::hits::<T, true>(token, &along, corners, edges, t_max);
+            let hits = leaf.hits::<T, true>(token, &shear, corners, edges, t_max);
             if let Some(hits) = hits {
-                let (leaf, primitives) = (self.leaf(bvh), bvh.primitives());
+                let primitives = bvh.primitives();
                 let best = &mut self.found;
                 if Found::choose::<T>(best, &mut self.t_max, leaf, hits, primitives) {
-                    self.far = self.t_max + self.narrow.margin();
+                    self.far = reach_of(self.t_max, self.narrow.margin());
                     self.forget_the_far();
                 }
             }
-        } else if L::Ref::hits::<T, false>(token, &along, corners, edges, t_max).is_some() {
+        } else if (leaf.hits::<T, false>(token, &shear, corners, edges, t_max)).is_some() {
             self.found = Some(Found::default());
             self.current = BOTTOM;
             return;

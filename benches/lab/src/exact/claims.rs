@@ -9,16 +9,19 @@
 //! 3. It differs from the definition in space ([`intersect`]) only where the line passes an edge that near: some edge
 //!    function p × q of exact shears p and q is no larger than what corners moved by δ = 7uM on each axis can
 //!    change it by, δ·(|p.x| + |p.y| + |q.x| + |q.y|) + 2δ².
-//! 4. t is within 66·uZ / |d.z| of t* = Σ w·z / d.z, with the exact weights w of 0 in the triangle of x' and y'.
-//! 5. u and v are within 8u·X·Y / |det| + 5u of those weights, where X and Y are the largest |x'| and |y'|.
-//! 6. t is within 66·uZ / |d.z| + δ·(|n.x| + |n.y|) / |n·d| of the t of the definition, where both hit and n is the
-//!    triangle's normal: a point δ beside the ray leaves the plane by no more.
-//! 7. The box test passes the least box of floats around P = Σ w·corner, in a scene of the triangle alone, for t as far
+//! 4. t is within B = 16·uZ / |d.z| + 272·u|t| of t* = Σ w·z / d.z, with the exact weights w of 0 in the triangle of x' and
+//!    y', and u and v are within 8u·X·Y / |det| + 5u of those weights, where X and Y are the largest |x'| and |y'|;
+//! 5. or else the ray at t is within 4uM, on each axis, of the point that u and v are the weights of, which are none below
+//!    0 and not above 1, nor is their sum, but for a rounding.
+//! 6. t is within B + δ·(|n.x| + |n.y|) / |n·d| of the t of the definition, where both hit and n is the triangle's normal: a
+//!    point δ beside the ray leaves the plane by no more.
+//! 7. The box test passes the least box of floats around P = Σ w·corner, in a scene of the triangle alone, w being the
+//!    weights of 4 or those of 5, for t as far
 //!    as computed and no farther: on every backend, in nodes of either width. And it passes the triangle's own box
 //!    wherever the ray, by definition, meets it.
 //! 8. It passes every box that the ray comes within 7uD of on the axes x and y of the shear where it is at the box's
 //!    place along z, D being the largest of |scene bound| + |o| on any axis; and it still does where the range of t ends, or
-//!    begins, 64·uD / |d.z| from there. That is what the proof in `src/slab` has of the triangle test, and uses up what
+//!    begins, 14·uD / |d.z| + 264·u|t| from there. That is what the proof in `src/slab` has of the triangle test, and uses up what
 //!    roundings of the box test itself leave of its margins: they are no larger than they have to be for it.
 //! 9. The test of a bundle, of this ray and one whose origin, which planes are taken from, is on the other side of the
 //!    scene, passes such a box, too; and one within 12uD, for its margin has more room for roundings than they take
@@ -49,9 +52,14 @@ pub const MIN_EXTENT: f32 = 1.0 / (1_u128 << 70) as f32;
 /// How far corners are moved by rounding: claim 1.
 pub const K_SHEAR: f32 = 7.0;
 /// How far t is off: claim 4.
-pub const K_T: f32 = 66.0;
-/// What claim 8 uses of that: the rest is for the box test's own roundings.
-const K_T_USED: f32 = 64.0;
+pub const K_T: f32 = 16.0;
+/// The same of t itself.
+pub const K_RELATIVE: f32 = 272.0;
+/// What claim 8 uses of them: the rest is for the box test's own roundings.
+const K_T_USED: f32 = 14.0;
+const K_RELATIVE_USED: f32 = 264.0;
+/// How far the ray at t is from where u and v say: claim 5.
+pub const K_PLACE: f32 = 4.0;
 /// What claim 9 uses of the bundle's margin of 24, of which roundings take less than 12.
 const K_BUNDLE_USED: f32 = 12.0;
 /// Directions' components are not cut off from here.
@@ -104,10 +112,10 @@ pub fn check(ray: &Ray, corners: [Vec3; 3]) -> Result<Option<Hit>, String> {
         ));
     }
     if let (Some(hit), Some(weights)) = (&hit, &weights) {
-        claims.t(hit, weights, defined.as_ref())?;
-        claims.uv(hit, weights)?;
-        claims.least_box(hit, weights)?;
-        claims.boxes_beside(hit, weights)?;
+        let weights = claims.place(hit, weights)?;
+        claims.t(hit, defined.as_ref())?;
+        claims.least_box(hit, &weights)?;
+        claims.boxes_beside(hit, &weights)?;
     }
     claims.own_box()?;
     Ok(hit)
@@ -203,48 +211,50 @@ impl Claims<'_> {
     }
 
     /// How far t may be off t*. Besides the bound, what is lost where t is denormal in the caller's unit.
-    fn t_bound(&self) -> Number {
+    fn t_bound(&self, t: f32) -> Number {
         let z = exact(self.sheared.depth().max(MIN_EXTENT));
-        exact(K_T) * exact(U) * z / self.length() + exact(f32::from_bits(1))
+        exact(K_T) * exact(U) * z / self.length()
+            + exact(K_RELATIVE) * exact(U) * abs(&exact(t))
+            + exact(f32::from_bits(1))
     }
 
-    fn t(
-        &self,
-        hit: &Hit,
-        weights: &[Number; 3],
-        defined: Option<&ExactHit>,
-    ) -> Result<(), String> {
-        if !hit.t.is_finite() || hit.t.abs() == f32::MAX {
-            // More than a float holds in the caller's unit.
-            return Ok(());
-        }
-        let (t_star, bound) = (self.t_star(weights), self.t_bound());
+    /// Whether t is more than a float holds in the caller's unit.
+    fn is_far(hit: &Hit) -> bool {
+        !hit.t.is_finite() || hit.t.abs() == f32::MAX
+    }
+
+    /// The weights of P: those of claim 4, or else of claim 5.
+    fn place(&self, hit: &Hit, weights: &[Number; 3]) -> Result<[Number; 3], String> {
+        let (t_star, bound) = (self.t_star(weights), self.t_bound(hit.t));
         let off = abs(&(exact(hit.t) - &t_star));
-        if off > bound {
-            let (t, bounds) = (t_star.to_f64_fast(), (off / bound).to_f64_fast());
-            return Err(format!(
-                "claim 4: {hit:?}, t* = {t:e}, off by {bounds} times the bound"
-            ));
+        let of_t = (off / bound).to_f64_fast();
+        let of_weights = self.weights_off(hit, weights);
+        if (Self::is_far(hit) || of_t <= 1.0) && of_weights <= 1.0 {
+            return Ok(weights.clone());
         }
-        let Some(defined) = defined else {
-            return Ok(());
-        };
-        let [a, b, c] = &self.exact_corners;
-        let normal = cross(&sub(b, a), &sub(c, a));
-        let [x, y, _] = self.sheared.axes;
-        let slope = (abs(&normal[x]) + abs(&normal[y])) / abs(&dot(&normal, &self.exact_direction));
-        let bound = bound + &self.delta * slope;
-        let off = abs(&(exact(hit.t) - &defined.t));
-        if off > bound {
-            let (defined, bounds) = (show(Some(defined)), (off / bound).to_f64_fast());
-            return Err(format!(
-                "claim 6: {hit:?}, by definition {defined}: off by {bounds} bounds"
-            ));
+        let (u, v) = (exact(hit.u), exact(hit.v));
+        let first = exact(1.0) - &u - &v;
+        let given = [first, u, v];
+        let most = exact(K_PLACE) * exact(U) * exact(self.sheared.distance().max(MIN_EXTENT));
+        let is_there = (0..3).all(|axis| {
+            let at_t = &self.exact_origin[axis] + &self.exact_direction[axis] * exact(hit.t);
+            let [a, b, c] = self.exact_corners.each_ref().map(|corner| &corner[axis]);
+            let at_uv = &given[0] * a + &given[1] * b + &given[2] * c;
+            Self::is_far(hit) || abs(&(at_t - at_uv)) <= most
+        });
+        let is_inside = given[0] >= exact(-2.0 * U) && hit.u >= 0.0 && hit.v >= 0.0;
+        if is_there && is_inside {
+            return Ok(given);
         }
-        Ok(())
+        let t = t_star.to_f64_fast();
+        Err(format!(
+            "claims 4 and 5: {hit:?}, t* = {t:e}: off by {of_t} times the bound, a weight by {of_weights} times, and not \
+             where they say: there: {is_there}, inside: {is_inside}"
+        ))
     }
 
-    fn uv(&self, hit: &Hit, weights: &[Number; 3]) -> Result<(), String> {
+    /// How far u and v are off, in bounds of claim 4.
+    fn weights_off(&self, hit: &Hit, weights: &[Number; 3]) -> f64 {
         let corners = self
             .sheared
             .corners
@@ -257,14 +267,28 @@ impl Claims<'_> {
             a.max(b).max(c)
         };
         let bound = exact(U) * (exact(8.0) * largest(0) * largest(1) / determinant + exact(5.0));
-        for (computed, exactly) in [hit.u, hit.v].into_iter().zip(&weights[1..]) {
-            let off = abs(&(exact(computed) - exactly));
-            if off > bound {
-                let bounds = (off / bound).to_f64_fast();
-                return Err(format!(
-                    "claim 5: {hit:?}, a weight is off by {bounds} bounds"
-                ));
-            }
+        let off = |computed: f32, exactly: &Number| {
+            (abs(&(exact(computed) - exactly)) / &bound).to_f64_fast()
+        };
+        off(hit.u, &weights[1]).max(off(hit.v, &weights[2]))
+    }
+
+    /// Claim 6.
+    fn t(&self, hit: &Hit, defined: Option<&ExactHit>) -> Result<(), String> {
+        let Some(defined) = defined.filter(|_| !Self::is_far(hit)) else {
+            return Ok(());
+        };
+        let [a, b, c] = &self.exact_corners;
+        let normal = cross(&sub(b, a), &sub(c, a));
+        let [x, y, _] = self.sheared.axes;
+        let slope = (abs(&normal[x]) + abs(&normal[y])) / abs(&dot(&normal, &self.exact_direction));
+        let bound = self.t_bound(hit.t) + &self.delta * slope;
+        let off = abs(&(exact(hit.t) - &defined.t));
+        if off > bound {
+            let (defined, bounds) = (show(Some(defined)), (off / bound).to_f64_fast());
+            return Err(format!(
+                "claim 6: {hit:?}, by definition {defined}: off by {bounds} bounds"
+            ));
         }
         Ok(())
     }
@@ -322,7 +346,8 @@ impl Claims<'_> {
         let choice = (hit.t.to_bits() ^ hit.u.to_bits()) as usize;
         let t_star = self.t_star(weights);
         let extent = exact(extent.next_down());
-        let early = exact(K_T_USED) * exact(U) * &extent / self.length();
+        let early = exact(K_T_USED) * exact(U) * &extent / self.length()
+            + exact(K_RELATIVE_USED) * exact(U) * abs(&t_star);
         let infinity = f32::INFINITY;
         let (t_min, t_max) = match choice / 2 % 3 {
             0 => (-infinity, infinity),
@@ -484,29 +509,24 @@ mod tests {
         );
         let hit = brute_force(&ray, corners).unwrap();
         assert!(claims.shear().is_ok() && !claims.is_near_an_edge());
-        assert!(claims.t(&hit, &weights, defined.as_ref()).is_ok());
-        assert!(claims.uv(&hit, &weights).is_ok() && claims.least_box(&hit, &weights).is_ok());
+        assert_eq!(claims.place(&hit, &weights).as_ref(), Ok(&weights));
+        assert!(claims.t(&hit, defined.as_ref()).is_ok());
+        assert!(claims.least_box(&hit, &weights).is_ok());
 
         let off = Hit {
-            t: hit.t * (1.0 + 1e-5),
+            t: hit.t * (1.0 + 1e-4),
             ..hit
         };
-        assert!(
-            claims
-                .t(&off, &weights, None)
-                .unwrap_err()
-                .starts_with("claim 4")
-        );
-        let off = Hit {
+        let error = claims.t(&off, defined.as_ref()).unwrap_err();
+        assert!(error.starts_with("claim 6"), "{error}");
+        let aside = Hit {
             v: hit.v + 1e-5,
             ..hit
         };
-        assert!(
-            claims
-                .uv(&off, &weights)
-                .unwrap_err()
-                .starts_with("claim 5")
-        );
+        for hit in [off, aside] {
+            let error = claims.place(&hit, &weights).unwrap_err();
+            assert!(error.starts_with("claims 4 and 5"), "{error}");
+        }
         let far = Hit {
             t: hit.t + 0.1,
             ..hit

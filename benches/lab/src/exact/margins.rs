@@ -4,7 +4,7 @@
 //! In `f64`, good to a part in a million: enough to measure by. [`claims`](super::claims) decides.
 
 use super::{
-    claims::{K_SHEAR, K_T, MIN_EXTENT},
+    claims::{K_PLACE, K_RELATIVE, K_SHEAR, K_T, MIN_EXTENT},
     sheared::Sheared,
 };
 use glam::Vec3;
@@ -60,11 +60,22 @@ pub fn margins(ray: &Ray, corners: [Vec3; 3], hit: Option<&Hit>) -> Margins {
         let t_star = mean / f64::from(sheared.direction[z]);
         let t = f64::from(hit.t) * sheared.scale;
         let depth = f64::from(sheared.depth().max(MIN_EXTENT));
-        let bound = f64::from(K_T) * U * depth / f64::from(sheared.direction[z].abs());
-        margins.t = (t - t_star).abs() / bound;
+        let bound = f64::from(K_T) * U * depth / f64::from(sheared.direction[z].abs())
+            + f64::from(K_RELATIVE) * U * t.abs();
+        margins.t = ((t - t_star).abs() / bound).min(place(ray, corners, hit, &sheared));
         [margins.slab, margins.gap] = slab(ray, corners, &sheared, weights, t_star);
     }
     margins
+}
+
+/// How far the ray at t is from the point that u and v say, in bounds.
+fn place(ray: &Ray, corners: [Vec3; 3], hit: &Hit, sheared: &Sheared) -> f64 {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    let [t, u, v] = [hit.t, hit.u, hit.v].map(f64::from);
+    let at_t = ray.origin.as_dvec3() + ray.direction.as_dvec3() * t;
+    let at_uv = a + (b - a) * u + (c - a) * v;
+    let bound = f64::from(K_PLACE) * U * f64::from(sheared.distance().max(MIN_EXTENT));
+    (at_t - at_uv).abs().max_element() / bound
 }
 
 fn shear(ray: &Ray, corners: [Vec3; 3], sheared: &Sheared) -> f64 {
