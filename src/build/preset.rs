@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 63 to 96 | 0.78 |
-/// | [`Balanced`](Self::Balanced) | 380 to 510 | 0.94 |
-/// | [`Best`](Self::Best) | 1,130 to 1,580 | 1 |
+/// | [`Fast`](Self::Fast) | 63 to 85 | 0.77 |
+/// | [`Balanced`](Self::Balanced) | 380 to 500 | 0.93 |
+/// | [`Best`](Self::Best) | 1,130 to 1,570 | 1 |
 ///
 /// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
