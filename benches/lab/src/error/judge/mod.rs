@@ -35,7 +35,7 @@ use wide_bvh::geometry::{Hit, Ray};
 const SHIFT: f64 = 10.2 / 16_777_216.0;
 
 /// How far `t` may be off for an answer to be about the same place: 2^-17 of the same distance, over the
-/// largest component of the direction. It is the bound that this crate documents.
+/// largest component of the direction. A few times what tests in `f32` are off by.
 const T_ROUNDING: f64 = 1.0 / 131_072.0;
 
 /// What an answer is.
