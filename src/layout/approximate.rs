@@ -117,7 +117,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// needles, on triangles seen nearly edge-on and on large ones seen from near, `u`, `v` and `t` are as far off as `f32`
     /// has them, and with them which of two triangles is first: over needles 10^-3 to 10^-5 as wide as long, one ray in a
     /// thousand has `t` off by more than 2·10^-3 of itself, where the exact test has 10^-7, and a few in a thousand hit
-    /// what they pass; over rooms one in a thousand has it off by 10^-5, where the exact test has 4·10^-7.
+    /// what they pass; over six scenes one in a thousand has it off by 10^-5, where the exact test has 4·10^-7.
     /// Still, no line slips through a closed mesh, whose size is between 10^-15 and 10^15; a ray may, by a `t` that is too far
     /// off for its range, at triangles that reach from before its origin to behind it.
     ///
