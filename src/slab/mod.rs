@@ -111,8 +111,9 @@ pub struct RaySlabs<const N: usize, V> {
     reciprocal: [V; 3],
     near: [V; 3],
     far: [V; 3],
-    /// The least `t`, less [`margin`](Self::margin).
+    /// The least `t`, less S of it.
     t_min: V,
+    /// Of S, what is of the scene.
     margin: V,
     /// How many bytes after the first of a node's planes those are that are met first, by axis.
     first: [usize; 3],
@@ -177,7 +178,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
             reciprocal,
             near: [zero; 3],
             far: [zero; 3],
-            t_min: t_min - (t_min.abs() * V::splat(token, K_RELATIVE * UNIT_ROUNDOFF) + margin),
+            t_min: t_min - slack(token, t_min, margin),
             margin,
             first: [
                 first_planes(0, direction.x, Self::SIDE),
@@ -258,7 +259,13 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
 /// Up to which `t` boxes are of interest, where hits are up to `t_max`.
 #[inline(always)]
 pub(crate) fn reach<const N: usize, V: Vector<N>>(token: V::Token, t_max: V, margin: V) -> V {
-    t_max + (t_max.abs() * V::splat(token, K_RELATIVE * UNIT_ROUNDOFF) + margin)
+    t_max + slack(token, t_max, margin)
+}
+
+/// S(t), for `margin` the part of it that is of the scene.
+#[inline(always)]
+fn slack<const N: usize, V: Vector<N>>(token: V::Token, t: V, margin: V) -> V {
+    t.abs() * V::splat(token, K_RELATIVE * UNIT_ROUNDOFF) + margin
 }
 
 /// The same of one number.

@@ -16,13 +16,13 @@
 //! 6. t is within B + δ·(|n.x| + |n.y|) / |n·d| of the t of the definition, where both hit and n is the triangle's normal: a
 //!    point δ beside the ray leaves the plane by no more.
 //! 7. The box test passes the least box of floats around P = Σ w·corner, in a scene of the triangle alone, w being the
-//!    weights of 4 or those of 5, for t as far
-//!    as computed and no farther: on every backend, in nodes of either width. And it passes the triangle's own box
-//!    wherever the ray, by definition, meets it.
+//!    weights of 4 or those of 5, for t as far as computed and no farther: on every backend, in nodes of either width. And
+//!    it passes the triangle's own box wherever the ray, by definition, meets it.
 //! 8. It passes every box that the ray comes within 7uD of on the axes x and y of the shear where it is at the box's
 //!    place along z, D being the largest of |scene bound| + |o| on any axis; and it still does where the range of t ends, or
-//!    begins, 14·uD / |d.z| + 264·u|t| from there. That is what the proof in `src/slab` has of the triangle test, and uses up what
-//!    roundings of the box test itself leave of its margins: they are no larger than they have to be for it.
+//!    begins, 14·uD / |d.z| + 264·u|t| from there. That is no less than what the proof in `src/slab` has of the triangle
+//!    test, and uses up what roundings of the box test itself leave of K_BOX and K_RELATIVE: they are no larger than they
+//!    have to be for it.
 //! 9. The test of a bundle, of this ray and one whose origin, which planes are taken from, is on the other side of the
 //!    scene, passes such a box, too; and one within 12uD, for its margin has more room for roundings than they take
 //!    where no reciprocal is cut off.

@@ -117,20 +117,17 @@ fn check_width<N: WideNode>(
         for backend in backends(first, rays) {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
-            checked += flushed_if(flush, || {
-                let one_by_one = ask_one_by_one(&bvh, name, rays, expected)?;
-                Ok(one_by_one + ask_at_once(&bvh, wrong(name), batched, expected)?)
-            })?;
+            checked += flushed_if(flush, || ask(&bvh, name, [rays, batched], expected))?;
         }
         let some = &rays[..rays.len() / 8];
         checked += if known.is_empty() {
             let name = format!("{name}, opened");
             let bytes = written(&bvh, &name)?;
             let bvh = opened::<N, TriangleLeaf>(&bytes, &name)?;
-            flushed_if(flush, || ask(&bvh, || name.clone(), some, expected))?
+            flushed_if(flush, || ask(&bvh, || name.clone(), [some; 2], expected))?
         } else {
             let name = || format!("{name}, borrowed");
-            flushed_if(flush, || ask(&bvh.as_borrowed(), name, some, expected))?
+            flushed_if(flush, || ask(&bvh.as_borrowed(), name, [some; 2], expected))?
         };
         known.push(bvh);
     }
@@ -248,15 +245,15 @@ fn same<T: bytemuck::Pod>(a: &[T], b: &[T]) -> bool {
     bytemuck::cast_slice::<T, u8>(a) == bytemuck::cast_slice::<T, u8>(b)
 }
 
-/// Every kind of call, over all rays.
+/// Every kind of call: over some rays one by one, and over the first of them, or all, at once.
 fn ask<N: WideNode, S: Storage>(
     bvh: &Bvh<N, TriangleLeaf, S>,
     name: impl Fn() -> String,
-    rays: &[Ray],
+    [rays, batched]: [&[Ray]; 2],
     expected: &[Option<Hit>],
 ) -> Result<u64, Mismatch> {
     let one_by_one = ask_one_by_one(bvh, &name, rays, expected)?;
-    Ok(one_by_one + ask_at_once(bvh, wrong(name), rays, expected)?)
+    Ok(one_by_one + ask_at_once(bvh, wrong(name), batched, expected)?)
 }
 
 /// A call that was answered wrong.
