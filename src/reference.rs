@@ -128,14 +128,20 @@ fn intersect_triangle(ray: &PreparedRay, vertices: [Vec3; 3]) -> Option<[f32; 3]
     let depth = ab.abs().max(ac.abs());
     let spread = extent_x * extent_y + extent_x.max(extent_y) * (a[kz].abs() * 0.5);
     let doubt = (spread / size + 1.0) * depth;
-    let sound = xa != 0.0 && xb != 0.0 && xc != 0.0 && size > pow2(-100) && size < pow2(126);
-    let [t, u, v] = if sound && doubt <= z.abs() * 16.0 {
-        [z * reciprocal, u, v]
+    let ordinary = size > pow2(-100) && size < pow2(126);
+    let sound = xa != 0.0 && xb != 0.0 && xc != 0.0 && ordinary;
+    let precise = ordinary && doubt <= z.abs() * 16.0;
+    let [t, u, v] = if precise {
+        // But for the signs.
+        if sound {
+            [z * reciprocal, u, v]
+        } else {
+            sheared
+        }
     } else {
         // In `f64`: of the triangle as given, if the ray meets it, and about there; else of the sheared one.
         let error = (doubt + a[kz].abs()) * (reciprocal.abs() * (32.0 * unit));
-        let is_there =
-            |t: f32| !sound || error == f32::INFINITY || (t - z * reciprocal).abs() <= error;
+        let is_there = |t: f32| !sound || (t - z * reciprocal).abs() <= error;
         let [o, d] = [origin, direction].map(Vec3::as_dvec3);
         let exactly = vertices.map(|vertex| {
             let p = vertex.as_dvec3() - o;

@@ -52,33 +52,41 @@ impl Pairs for Pair {
     }
 }
 
+/// What `f32` leaves open.
+pub(super) enum Open {
+    /// Whether the triangle is hit.
+    Signs,
+    /// Where: at a `t` no farther than `error` from `about`.
+    Place {
+        about: f32,
+        error: f32,
+    },
+    Both,
+}
+
 /// `t`, `u` and `v` of a triangle, or `None` for a miss by the exact signs of the edge functions.
 ///
-/// They are those of the triangle and the ray as given, to what `f32` holds, if these meet, and no farther than `fence` from
-/// `estimate`; an infinite fence says that the signs are not known. Where they do not meet, but for the rounding of the
-/// shear, they are those of the triangle as sheared.
+/// If the place is open they are those of the triangle and the ray as given, to what `f32` holds, if these meet and `t` is
+/// about what was said. Else, where these do not meet but for the rounding of the shear, they are those of the triangle as
+/// sheared.
 #[cold]
 #[inline(never)]
-pub(super) fn exact_hit(
-    pair: &Pair,
-    corners: [[f32; 3]; 3],
-    estimate: f32,
-    fence: f32,
-) -> Option<[f32; 3]> {
+pub(super) fn exact_hit(pair: &Pair, corners: [[f32; 3]; 3], open: Open) -> Option<[f32; 3]> {
     let along = pair.direction[2];
     let sheared = Pair {
         corners,
         origin: [0.0; 3],
         direction: [0.0, 0.0, 1.0],
     };
-    let (anywhere, mut rounded) = (fence == f32::INFINITY, None);
-    if anywhere {
-        rounded = Some(solve(&sheared, along, 0.0)?);
+    let as_sheared = || solve(&sheared, along, 0.0);
+    let as_given = || solve(pair, along, f64::from(UNIT_ROUNDOFF));
+    match open {
+        Open::Signs => as_sheared(),
+        Open::Both => as_sheared().map(|sheared| as_given().unwrap_or(sheared)),
+        Open::Place { about, error } => as_given()
+            .filter(|[t, ..]| (t - about).abs() <= error)
+            .or_else(as_sheared),
     }
-    solve(pair, along, f64::from(UNIT_ROUNDOFF))
-        .filter(|[t, ..]| anywhere || (t - estimate).abs() <= fence)
-        .or(rounded)
-        .or_else(|| solve(&sheared, along, 0.0))
 }
 
 /// `t`, for `along` a unit of z, `u` and `v` where a ray meets a triangle, if it does, and the triangle's area, as the ray

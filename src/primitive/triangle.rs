@@ -14,7 +14,7 @@
 
 use core::ops::{Mul, Sub};
 
-use super::exact::{Pair, Pairs, exact_hit};
+use super::exact::{Open, Pair, Pairs, exact_hit};
 use crate::{
     geometry::Ray,
     simd::{F32x1, Portable, Vector, splat3},
@@ -316,10 +316,11 @@ impl<V> Along<V> {
         let spread =
             extent_x * extent_y + extent_x.max(extent_y) * (az.abs() * V::splat(token, 0.5));
         let doubt = (spread / size + V::splat(token, 1.0)) * depth;
-        // Where the signs are certain, and nothing overflows or vanishes.
-        let sound =
-            (zero.lt(least) | most.lt(zero)) & finite & V::splat(token, MIN_DETERMINANT).lt(size);
-        let certain = sound & doubt.le(z.abs() * V::splat(token, CONDITION));
+        // Where nothing overflows or vanishes; the signs are certain, too; and `t` is good enough.
+        let ordinary = finite & V::splat(token, MIN_DETERMINANT).lt(size);
+        let sound = (zero.lt(least) | most.lt(zero)) & ordinary;
+        let precise = ordinary & doubt.le(z.abs() * V::splat(token, CONDITION));
+        let certain = sound & precise;
 
         // How far `t` may be off, twice over: where it cannot matter, no better one is worked out.
         let error = (doubt + az.abs()) * (reciprocal.abs() * V::splat(token, 32.0 * UNIT_ROUNDOFF));
@@ -337,8 +338,8 @@ impl<V> Along<V> {
             }
         }
         if mask != candidates {
-            let fence = sound.select(error, infinity);
-            let (estimates, fences) = (t.to_array(), fence.to_array());
+            let (estimates, errors) = (t.to_array(), error.to_array());
+            let (sound, precise) = (sound.bits(), precise.bits());
             let sheared = [
                 [ax.to_array(), ay.to_array(), az.to_array()],
                 [bx.to_array(), by.to_array(), bz.to_array()],
@@ -352,8 +353,15 @@ impl<V> Along<V> {
                     [b[0][at], b[1][at], b[2][at]],
                     [c[0][at], c[1][at], c[2][at]],
                 ];
-                let hit = exact_hit(&pairs.pair(lane), sheared, estimates[at], fences[at]);
-                if let Some(hit) = hit {
+                let open = match (sound >> lane & 1, precise >> lane & 1) {
+                    (1, _) => Open::Place {
+                        about: estimates[at],
+                        error: errors[at],
+                    },
+                    (_, 1) => Open::Signs,
+                    _ => Open::Both,
+                };
+                if let Some(hit) = exact_hit(&pairs.pair(lane), sheared, open) {
                     t = t.replace(token, lane, hit[0]);
                     u = u.replace(token, lane, hit[1]);
                     v = v.replace(token, lane, hit[2]);

@@ -12,7 +12,7 @@
 //! (for r < 0, the box's two planes change places, here and below) and the box is passed when
 //!
 //! ```text
-//! max(near, t_min - S(t_min)) <= min(far, t_max + S(t_max)),  S(t) = K_T·u·D·|r.z| + K_RELATIVE·u·|t|
+//! max(near, t_min - S(t_min)) <= min(far, t_max + S(t_max)),  S(t) = u·D·|r.z| + K_RELATIVE·u·|t|
 //! ```
 //!
 //! with z the axis of the largest direction component. Let M be the largest |vertex - o| of a triangle on
@@ -49,7 +49,7 @@
 //!   7u·M, for the P of these weights, whose z t has to 2^-50·M.
 //! - Or the corners are those of (1), the edge functions are exact but for their last rounding, and so are the weights.
 //!
-//! In both t is off by u·|t| and 2^-50·M·|r.z|: **K_T = 16** is for M and D being rounded, and to spare.
+//! In both t is off by u·|t| and 2^-50·M·|r.z|, a quarter of what S has of D: the rest is for results that are denormal.
 //!
 //! *The pass itself.* A hit that counts has t_min <= t <= t_max. By (4), and as t + S(t) and t - S(t) grow with t,
 //! t_min - S(t_min) <= t* <= t_max + S(t_max); by (2), near <= t* <= far on each axis: t* is between the two sides of the
@@ -93,8 +93,6 @@ pub(crate) const UNIT_ROUNDOFF: f32 = pow2(-24);
 /// Margin of the box test: derived above.
 const K_BOX: f32 = 14.0;
 /// Margin of the computed `t` of a triangle: derived above.
-const K_T: f32 = 16.0;
-/// The same of a hit, of its `t`.
 const K_RELATIVE: f32 = 272.0;
 /// Margin of a primitive's own interval: derived above.
 const K_PRIMITIVE: f32 = 6.0;
@@ -172,7 +170,7 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
             reciprocal[1].abs(),
             reciprocal[2].abs(),
         ];
-        let margin = extent * V::splat(token, K_T * UNIT_ROUNDOFF) * rx.min(ry).min(rz);
+        let margin = extent * V::splat(token, UNIT_ROUNDOFF) * rx.min(ry).min(rz);
         let zero = V::splat(token, 0.0);
         let mut slabs = Self {
             reciprocal,

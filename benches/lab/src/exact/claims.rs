@@ -9,7 +9,7 @@
 //! 3. It differs from the definition in space ([`intersect`]) only where the line passes an edge that near: some edge
 //!    function p × q of exact shears p and q is no larger than what corners moved by δ = 7uM on each axis can
 //!    change it by, δ·(|p.x| + |p.y| + |q.x| + |q.y|) + 2δ².
-//! 4. t is within B = 16·uZ / |d.z| + 272·u|t| of t* = Σ w·z / d.z, with the exact weights w of 0 in the triangle of x' and
+//! 4. t is within B = uZ / |d.z| + 272·u|t| of t* = Σ w·z / d.z, with the exact weights w of 0 in the triangle of x' and
 //!    y', and u and v are within 8u·X·Y / |det| + 5u of those weights, where X and Y are the largest |x'| and |y'|;
 //! 5. or else the ray at t is within 4uM, on each axis, of the point that u and v are the weights of, which are none below
 //!    0 and not above 1, nor is their sum, but for a rounding.
@@ -20,7 +20,7 @@
 //!    it passes the triangle's own box wherever the ray, by definition, meets it.
 //! 8. It passes every box that the ray comes within 7uD of on the axes x and y of the shear where it is at the box's
 //!    place along z, D being the largest of |scene bound| + |o| on any axis; and it still does where the range of t ends, or
-//!    begins, 14·uD / |d.z| + 264·u|t| from there. That is no less than what the proof in `src/slab` has of the triangle
+//!    begins, uD / |d.z| + 264·u|t| from there. That is no less than what the proof in `src/slab` has of the triangle
 //!    test, and uses up what roundings of the box test itself leave of K_BOX and K_RELATIVE: they are no larger than they
 //!    have to be for it.
 //! 9. The test of a bundle, of this ray and one whose origin, which planes are taken from, is on the other side of the
@@ -51,12 +51,9 @@ const U: f32 = 1.0 / (1 << 24) as f32;
 pub const MIN_EXTENT: f32 = 1.0 / (1_u128 << 70) as f32;
 /// How far corners are moved by rounding: claim 1.
 pub const K_SHEAR: f32 = 7.0;
-/// How far t is off: claim 4.
-pub const K_T: f32 = 16.0;
-/// The same of t itself.
+/// How far t is off, of t itself: claim 4.
 pub const K_RELATIVE: f32 = 272.0;
-/// What claim 8 uses of them: the rest is for the box test's own roundings.
-const K_T_USED: f32 = 14.0;
+/// What claim 8 uses of it: the rest is for the box test's own roundings.
 const K_RELATIVE_USED: f32 = 264.0;
 /// How far the ray at t is from where u and v say: claim 5.
 pub const K_PLACE: f32 = 4.0;
@@ -213,7 +210,7 @@ impl Claims<'_> {
     /// How far t may be off t*. Besides the bound, what is lost where t is denormal in the caller's unit.
     fn t_bound(&self, t: f32) -> Number {
         let z = exact(self.sheared.depth().max(MIN_EXTENT));
-        exact(K_T) * exact(U) * z / self.length()
+        exact(U) * z / self.length()
             + exact(K_RELATIVE) * exact(U) * abs(&exact(t))
             + exact(f32::from_bits(1))
     }
@@ -349,8 +346,8 @@ impl Claims<'_> {
         let choice = (hit.t.to_bits() ^ hit.u.to_bits()) as usize;
         let t_star = self.t_star(weights);
         let extent = exact(extent.next_down());
-        let early = exact(K_T_USED) * exact(U) * &extent / self.length()
-            + exact(K_RELATIVE_USED) * exact(U) * abs(&t_star);
+        let early =
+            exact(U) * &extent / self.length() + exact(K_RELATIVE_USED) * exact(U) * abs(&t_star);
         let infinity = f32::INFINITY;
         let (t_min, t_max) = match choice / 2 % 3 {
             0 => (-infinity, infinity),

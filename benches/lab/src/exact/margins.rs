@@ -4,7 +4,7 @@
 //! In `f64`, good to a part in a million: enough to measure by. [`claims`](super::claims) decides.
 
 use super::{
-    claims::{K_PLACE, K_RELATIVE, K_SHEAR, K_T, MIN_EXTENT},
+    claims::{K_PLACE, K_RELATIVE, K_SHEAR, MIN_EXTENT},
     sheared::Sheared,
 };
 use glam::Vec3;
@@ -60,8 +60,8 @@ pub fn margins(ray: &Ray, corners: [Vec3; 3], hit: Option<&Hit>) -> Margins {
         let t_star = mean / f64::from(sheared.direction[z]);
         let t = f64::from(hit.t) * sheared.scale;
         let depth = f64::from(sheared.depth().max(MIN_EXTENT));
-        let bound = f64::from(K_T) * U * depth / f64::from(sheared.direction[z].abs())
-            + f64::from(K_RELATIVE) * U * t.abs();
+        let bound =
+            U * depth / f64::from(sheared.direction[z].abs()) + f64::from(K_RELATIVE) * U * t.abs();
         margins.t = ((t - t_star).abs() / bound).min(place(ray, corners, hit, &sheared));
         [margins.slab, margins.gap] = slab(ray, corners, &sheared, weights, t_star);
     }
