@@ -7,7 +7,7 @@
 
 use super::{Child, ChildKind, Link, node::impl_wide_node};
 use crate::{
-    geometry::{Aabb, Ray},
+    geometry::Aabb,
     layout::run,
     simd::{Simd, Vector, packed_run},
     slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs, pow2},
@@ -31,8 +31,8 @@ pub type CompactNode4 = CompactNode<4, Head4>;
 /// Up to 8 children in 80 bytes.
 pub type CompactNode8 = CompactNode<8, Head8>;
 
-impl_wide_node!(CompactNode4, 3, 4, F32x4, 48, S::low);
-impl_wide_node!(CompactNode8, 4, 8, F32x8, 80, core::convert::identity);
+impl_wide_node!(CompactNode4, 3, 4, F32x4, 48);
+impl_wide_node!(CompactNode8, 4, 8, F32x8, 80);
 
 /// The grid of a node's planes, by axis.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

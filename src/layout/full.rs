@@ -2,7 +2,7 @@
 
 use super::{Child, Link, node::impl_wide_node};
 use crate::{
-    geometry::{Aabb, Ray},
+    geometry::Aabb,
     simd::{Simd, Vector},
     slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs},
 };
@@ -36,8 +36,8 @@ pub type Node4 = Node<4, Align16>;
 /// 8 children in 224 bytes.
 pub type Node8 = Node<8, Align32>;
 
-impl_wide_node!(Node4, 1, 4, F32x4, 112, S::low);
-impl_wide_node!(Node8, 2, 8, F32x8, 224, core::convert::identity);
+impl_wide_node!(Node4, 1, 4, F32x4, 112);
+impl_wide_node!(Node8, 2, 8, F32x8, 224);
 
 impl<const W: usize, A> Node<W, A> {
     const ORDERED: bool = false;

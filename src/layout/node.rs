@@ -2,7 +2,7 @@
 
 use super::{Child, Link};
 use crate::{
-    geometry::{Aabb, Ray},
+    geometry::Aabb,
     simd::{Lanes, Simd},
     slab::{BundleSlabs, NarrowRay},
 };
@@ -41,13 +41,6 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// The bounds of the child in a lane, as they are tested. Empty past the last.
     fn child_aabb(&self, lane: usize) -> Aabb;
 
-    #[doc(hidden)]
-    fn slabs<S: Simd>(
-        token: S,
-        ray: &Ray,
-        reciprocal: [S::F32x8; 3],
-        bounds: &Aabb,
-    ) -> Self::Slabs<S>;
     /// As [`test`](Self::test), for a bundle of rays.
     #[doc(hidden)]
     fn test_bundle<S: Simd>(
@@ -94,7 +87,7 @@ pub(super) mod sealed {
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome: `lanes`, `present`;
 /// - say where a lane, or every one, leads: `link`, `link_lanes`.
 macro_rules! impl_wide_node {
-    ($node:ty, $kind:literal, $width:literal, $vector:ident, $bytes:literal, $narrow:expr) => {
+    ($node:ty, $kind:literal, $width:literal, $vector:ident, $bytes:literal) => {
         const _: () = assert!(size_of::<$node>() == $bytes);
 
         // SAFETY: floats and integers alone, `repr(C)`, and no padding: the size above is the sum
@@ -134,16 +127,6 @@ macro_rules! impl_wide_node {
             #[inline]
             fn child_aabb(&self, lane: usize) -> Aabb {
                 self.aabb(lane)
-            }
-
-            #[inline(always)]
-            fn slabs<S: Simd>(
-                token: S,
-                ray: &Ray,
-                [x, y, z]: [S::F32x8; 3],
-                bounds: &Aabb,
-            ) -> Self::Slabs<S> {
-                RaySlabs::new(token, ray, [$narrow(x), $narrow(y), $narrow(z)], bounds)
             }
 
             #[inline(always)]

@@ -117,13 +117,17 @@ const MIN_DETERMINANT: f32 = pow2(-100);
 const MAX_DETERMINANT: f32 = pow2(126);
 
 impl<'a, V: Copy> RayShear<'a, V> {
-    /// `reciprocal` is [`PreparedRay::reciprocals`].
+    /// `along` is [`PreparedRay::along`].
     #[inline(always)]
-    pub(crate) fn new(prepared: &PreparedRay<'a>, reciprocal: [V; 3]) -> Self {
-        let z = prepared.axes[2];
-        // SAFETY: the axes are those of a prepared ray, a permutation of 0 to 2.
-        unsafe { core::hint::assert_unchecked(z < 3) };
-        Self::of(prepared.ray, prepared.axes, reciprocal[z])
+    pub(crate) fn new<const N: usize>(
+        token: V::Token,
+        prepared: &PreparedRay<'a>,
+        along: f32,
+    ) -> Self
+    where
+        V: Vector<N>,
+    {
+        Self::of(prepared.ray, prepared.axes, V::splat(token, along))
     }
 
     /// Of a prepared ray, its axes and the reciprocal along the last of them.

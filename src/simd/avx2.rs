@@ -22,12 +22,6 @@ impl Simd for Avx2 {
     type F32x8 = F32x8;
 
     #[inline(always)]
-    fn low(vector: F32x8) -> F32x4 {
-        // SAFETY: the vector exists only where an `Avx2` token was given.
-        F32x4(unsafe { _mm256_castps256_ps128(vector.0) })
-    }
-
-    #[inline(always)]
     fn transpose(self, rows: [F32x8; 8]) -> [F32x8; 8] {
         // SAFETY: the token says that the instructions are there.
         unsafe { transpose(rows) }

@@ -65,16 +65,6 @@ impl Backend {
         }
     }
 
-    /// As [`run`](Self::run), for what takes much stack: a call for every backend, whose frames the caller's has no part of.
-    #[inline(always)]
-    pub(crate) fn run_apart<O: Operation>(self, operation: O) -> O::Output {
-        match self.0 {
-            Kind::Portable => run_portable(operation),
-            #[cfg(target_arch = "x86_64")]
-            _ => self.run(operation),
-        }
-    }
-
     /// As [`run`](Self::run), by a call, so that what `operation` needs of registers is not taken from the caller's.
     #[inline(never)]
     pub(crate) fn call<O: Operation>(self, operation: O) -> O::Output {
@@ -85,7 +75,7 @@ impl Backend {
     #[inline(always)]
     pub(crate) fn run<O: Operation>(self, operation: O) -> O::Output {
         match self.0 {
-            Kind::Portable => operation.run(Portable),
+            Kind::Portable => run_portable(operation),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the token says that the processor has these instructions.
             Kind::Avx2(avx2) => unsafe { run_avx2(operation, avx2) },
@@ -96,7 +86,9 @@ impl Backend {
     }
 }
 
-#[inline(never)]
+/// A call where the others are: their callers' frames have no part of its own.
+#[cfg_attr(target_arch = "x86_64", inline(never))]
+#[cfg_attr(not(target_arch = "x86_64"), inline(always))]
 fn run_portable<O: Operation>(operation: O) -> O::Output {
     operation.run(Portable)
 }

@@ -19,12 +19,6 @@ impl Simd for Portable {
     ));
 
     #[inline(always)]
-    fn low(vector: f32x8) -> f32x4 {
-        let [a, b, c, d, ..] = vector.to_array();
-        f32x4::new([a, b, c, d])
-    }
-
-    #[inline(always)]
     fn prefetch(self, _: *const u8) {}
 }
 

@@ -17,9 +17,6 @@ pub trait Simd: Copy {
     /// Whether triangles are tested one by one, since the target has no vectors: faster there, and less code.
     const ONE_BY_ONE: bool = false;
 
-    /// The first four of eight.
-    fn low(vector: Self::F32x8) -> Self::F32x4;
-
     /// Eight rows of eight as columns.
     #[inline(always)]
     fn transpose(self, rows: [Self::F32x8; 8]) -> [Self::F32x8; 8] {

@@ -1,12 +1,16 @@
-//! What the tests need of a ray, a number each, for rays that wait for their turn.
+//! What the tests need of a ray, a number each: of one that is traced by itself, or of many that wait for their turn.
 
-use super::{MAX_EXTENT, RaySlabs, first_planes, prepared::PreparedLanes};
+use super::{
+    K_BOX, MAX_EXTENT, MIN_EXTENT, PreparedRay, RaySlabs, UNIT_ROUNDOFF, first_planes, pow2,
+    prepared::{MAX_RECIPROCAL, PreparedLanes, greater, lanes},
+    slack,
+};
 use crate::{
     geometry::Aabb,
-    simd::{Lanes, Simd, Vector, splat3},
+    simd::{F32x1, Lanes, Portable, Simd, Vector, splat3},
 };
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// [`RaySlabs`] and more in one cache line.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -23,6 +27,77 @@ pub struct NarrowRay {
 }
 
 impl NarrowRay {
+    /// Room for [`new`](Self::new).
+    pub(crate) const ROOM: Self = Self {
+        reciprocal: [0.0; 3],
+        near: [0.0; 3],
+        far: [0.0; 3],
+        t_min: 0.0,
+        margin: 0.0,
+        first: [0; 3],
+        along: 0.0,
+        axes: 0,
+    };
+
+    /// A ray, for boxes within `bounds` in nodes of `width` children. Written where it stays: a copy, right after, would
+    /// wait for all that is written.
+    #[inline(always)]
+    pub(crate) fn new<'a>(
+        prepared: &PreparedRay,
+        bounds: &Aabb,
+        width: usize,
+        room: &'a mut Self,
+    ) -> &'a Self {
+        let corners: &[f32; 6] = bytemuck::cast_ref(bounds);
+        // As `RaySlabs::of_lanes`, but an axis a lane; what is in the fourth is of no meaning.
+        let [origin, direction] = lanes(prepared.ray);
+        let [lo, hi] = [
+            Vec4::from_slice(&corners[..4]),
+            Vec4::from_slice(&corners[2..]).yzwx(),
+        ];
+        let reciprocal = (1.0 / direction)
+            .max(Vec4::splat(-MAX_RECIPROCAL))
+            .min(Vec4::splat(MAX_RECIPROCAL));
+        let [x, y, z, _] = (lo.abs().max(hi.abs()) + origin.abs()).to_array();
+        let extent = greater(greater(greater(x, y), z), MIN_EXTENT);
+        let at_origin = -(origin * reciprocal);
+        let error = Vec4::splat(extent * (K_BOX * UNIT_ROUNDOFF)) * reciprocal.abs();
+
+        let direction = prepared.ray.direction;
+        let side = width * size_of::<f32>();
+        let numbers: &mut [f32; 16] = bytemuck::cast_mut(room);
+        // The fourth of each is written over.
+        numbers[..4].copy_from_slice(&reciprocal.to_array());
+        numbers[3..7].copy_from_slice(&(at_origin - error).to_array());
+        numbers[6..10].copy_from_slice(&(at_origin + error).to_array());
+        room.along = numbers[prepared.number as usize / 2 % 4];
+        room.first = [
+            first_planes(0, direction.x, side) as u32,
+            first_planes(1, direction.y, side) as u32,
+            first_planes(2, direction.z, side) as u32,
+        ];
+        room.axes = prepared.number;
+        let t_min = F32x1(prepared.ray.t_min);
+        let margin = F32x1(extent * UNIT_ROUNDOFF * room.along.abs());
+        room.margin = margin.0;
+        room.t_min = (t_min - slack(Portable, t_min, margin)).0;
+        if extent >= MAX_EXTENT {
+            room.open();
+        }
+        room
+    }
+
+    /// Has every box passed but the empty one.
+    #[cold]
+    #[inline(never)]
+    fn open(&mut self) {
+        for axis in 0..3 {
+            self.reciprocal[axis] = pow2(-126).copysign(self.reciprocal[axis]);
+            self.near[axis] = -f32::MAX;
+            self.far[axis] = f32::MAX;
+        }
+    }
+
     /// Eight rays, for boxes within `bounds` in nodes of `width` children, and a bit for each that is
     /// [ordinary](PreparedLanes) and not too far away. The others are of no meaning.
     #[inline(always)]

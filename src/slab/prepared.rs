@@ -2,8 +2,9 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Lanes, Portable, Simd, Vector, splat3},
+    simd::{Portable, Simd, Vector, splat3},
 };
+use glam::Vec4;
 
 /// A ray that can hit something, in numbers that the kernels can work with.
 ///
@@ -18,6 +19,8 @@ pub struct PreparedRay<'a> {
     /// The axes x, y, z of the shear: z is where the direction is largest, and x, y, z turn as the
     /// caller's axes do, mirrored if the ray runs against z.
     pub(crate) axes: &'static [usize; 3],
+    /// Their [number](PreparedLanes::axes).
+    pub(crate) number: u32,
     /// What the caller's `t` was multiplied by: a power of two.
     scale: f32,
     /// Its inverse.
@@ -31,7 +34,7 @@ const LONG_DIRECTION: f32 = pow2(24);
 
 /// Above this a reciprocal is cut off, so that a direction component that is zero, or next to it, needs no
 /// branch and makes no 0 · ∞. What it must satisfy is said in [`slab`](super).
-const MAX_RECIPROCAL: f32 = pow2(48);
+pub(super) const MAX_RECIPROCAL: f32 = pow2(48);
 
 /// 1 / direction, a component, no greater in magnitude than [`MAX_RECIPROCAL`].
 #[inline(always)]
@@ -72,16 +75,13 @@ impl<'a> PreparedRay<'a> {
         if !valid {
             return None;
         }
-        // Without branches, for which axis it is cannot be foreseen.
-        let not_x = usize::from(mx != largest);
-        let z = not_x + (not_x & usize::from(my != largest));
-        // Not by glam's index, which branches.
-        let negative = ray.direction.as_ref()[z].is_sign_negative();
-        let axes = &SHEAR_AXES[2 * z + usize::from(negative)];
+        let number = axes_number(ray, largest);
+        let axes = PreparedLanes::<f32>::axes(number);
         if (LEAST_DIRECTION..LONG_DIRECTION).contains(&largest) {
             return Some(Self {
                 ray,
                 axes,
+                number,
                 scale: 1.0,
                 unscale: 1.0,
             });
@@ -90,6 +90,7 @@ impl<'a> PreparedRay<'a> {
         Some(Self {
             ray: scaled,
             axes,
+            number,
             scale,
             unscale,
         })
@@ -135,6 +136,13 @@ impl<'a> PreparedRay<'a> {
     #[inline(always)]
     pub(crate) fn reciprocals<const N: usize, V: Vector<N>>(&self, token: V::Token) -> [V; 3] {
         reciprocals(token, splat3(token, self.ray.direction.to_array()))
+    }
+
+    /// The reciprocal of the direction's component along the last of the axes.
+    #[inline(always)]
+    pub(crate) fn along(&self) -> f32 {
+        let numbers: &[f32; 3] = self.ray.direction.as_ref();
+        1.0 / numbers[self.axes[2]]
     }
 
     /// What an accepted `t` is to be multiplied by for [`unscaled`](Self::unscaled).
@@ -230,17 +238,44 @@ pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
     lesser(greater(t, ray.t_min), ray.t_max) + 0.0
 }
 
+/// x, y and z of the origin and of the direction. The fourth number of each is of no meaning.
+#[inline(always)]
+pub(super) fn lanes(ray: &Ray) -> [Vec4; 2] {
+    let numbers: &[f32; 8] = bytemuck::cast_ref(ray);
+    [
+        Vec4::from_slice(&numbers[..4]),
+        Vec4::from_slice(&numbers[3..7]),
+    ]
+}
+
 /// Whether origin and direction are.
 #[inline(always)]
 fn is_finite(ray: &Ray) -> bool {
-    // 0 times a finite number is 0, times any other NaN. The last two lanes are the range of t.
-    let lanes: &[f32; 8] = bytemuck::cast_ref(ray);
+    // 0 times a finite number is 0, times any other NaN.
     if Portable::ONE_BY_ONE {
-        return lanes[..6].iter().all(|x| x * 0.0 == 0.0);
+        let numbers: &[f32; 8] = bytemuck::cast_ref(ray);
+        return numbers[..6].iter().all(|x| x * 0.0 == 0.0);
     }
-    let zero = wide::f32x8::splat(0.0);
-    let zeros = wide::f32x8::load(Portable, lanes) * zero;
-    Vector::<8>::le(zeros, zero).bits() & 0b11_1111 == 0b11_1111
+    let [origin, direction] = lanes(ray);
+    let zeros = origin * 0.0 + direction * 0.0;
+    zeros.cmpeq(Vec4::ZERO).bitmask() & 0b111 == 0b111
+}
+
+/// The number of the axes of the shear, `largest` being the direction's largest component. Without branches, for which axis
+/// it is cannot be foreseen.
+#[inline(always)]
+fn axes_number(ray: &Ray, largest: f32) -> u32 {
+    if Portable::ONE_BY_ONE {
+        let not_x = usize::from(ray.direction.x.abs() != largest);
+        let z = not_x + (not_x & usize::from(ray.direction.y.abs() != largest));
+        // Not by glam's index, which branches.
+        let negative = ray.direction.as_ref()[z].is_sign_negative();
+        return (2 * z + usize::from(negative)) as u32;
+    }
+    let [_, direction] = lanes(ray);
+    let largest = direction.abs().cmpeq(Vec4::splat(largest));
+    let z = largest.bitmask().trailing_zeros();
+    2 * z + (direction.is_negative_bitmask() >> (z % 4) & 1)
 }
 
 /// Writes `ray` with its direction scaled so that the largest component is in [1, 2), or as near as powers
@@ -277,7 +312,7 @@ static SHEAR_AXES: [[usize; 3]; 8] = [
 
 /// The greater of two numbers, neither of them NaN.
 #[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
+pub(super) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 

@@ -66,7 +66,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.backend().run_apart(Batch::<N, L, S, ClosestHit> {
+        self.backend().run(Batch::<N, L, S, ClosestHit> {
             bvh: self,
             rays,
             answers: hits,
@@ -76,7 +76,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
 
     /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 110 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.backend().run_apart(Batch::<N, L, S, AnyHit> {
+        self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
             rays,
             answers: occluded,
@@ -92,14 +92,13 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray],
         hits: &mut [Option<Hit>],
     ) {
-        self.backend()
-            .run_apart(Wave::<N, L, S, ClosestHit, LANES> {
-                bvh: self,
-                rays,
-                answers: hits,
-                scratch,
-                one: Self::closest_hit,
-            });
+        self.backend().run(Wave::<N, L, S, ClosestHit, LANES> {
+            bvh: self,
+            rays,
+            answers: hits,
+            scratch,
+            one: Self::closest_hit,
+        });
     }
 
     /// As [`any_hits`](Self::any_hits), in the caller's memory. See [`closest_hits_in`](Self::closest_hits_in).
@@ -109,7 +108,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray],
         occluded: &mut [bool],
     ) {
-        self.backend().run_apart(Wave::<N, L, S, AnyHit, LANES> {
+        self.backend().run(Wave::<N, L, S, AnyHit, LANES> {
             bvh: self,
             rays,
             answers: occluded,
@@ -128,13 +127,12 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [Option<Hit>; RAYS] {
-        self.backend()
-            .run_apart(Packet::<N, L, S, ClosestHit, RAYS> {
-                bvh: self,
-                rays,
-                active,
-                one: Self::closest_hit,
-            })
+        self.backend().run(Packet::<N, L, S, ClosestHit, RAYS> {
+            bvh: self,
+            rays,
+            active,
+            one: Self::closest_hit,
+        })
     }
 
     /// Whether [anything is in the way](Self::any_hit) of each ray that `active` has a bit for; `false` for the others.
@@ -143,7 +141,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         rays: &[Ray; RAYS],
         active: u64,
     ) -> [bool; RAYS] {
-        self.backend().run_apart(Packet::<N, L, S, AnyHit, RAYS> {
+        self.backend().run(Packet::<N, L, S, AnyHit, RAYS> {
             bvh: self,
             rays,
             active,

@@ -4,9 +4,9 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::WideNode,
     simd::{F32x1, Lanes, Portable, Simd},
-    slab::RaySlabs,
+    slab::{NarrowRay, RaySlabs},
 };
-use core::mem::MaybeUninit;
+use core::{hint::black_box, mem::MaybeUninit};
 use glam::Vec3;
 
 /// A ray in terms of nodes `N`.
@@ -16,6 +16,9 @@ pub(super) trait Boxes<N: WideNode> {
     /// The same, to be taken from.
     type Nears;
 
+    /// To be called after a leaf, which needs the registers: what nodes need is loaded again.
+    #[inline(always)]
+    fn renew(&mut self) {}
     /// By how much the greatest `t` is to be raised.
     fn margin(&self) -> f32;
     /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
@@ -29,22 +32,35 @@ pub(super) trait Boxes<N: WideNode> {
 }
 
 /// All at once.
-pub(super) struct AtOnce<T: Simd, N: WideNode> {
+pub(super) struct AtOnce<'a, T: Simd, N: WideNode> {
     token: T,
+    ray: &'a NarrowRay,
     slabs: N::Slabs<T>,
 }
 
-impl<T: Simd, N: WideNode> AtOnce<T, N> {
+impl<'a, T: Simd, N: WideNode> AtOnce<'a, T, N> {
     #[inline(always)]
-    pub(super) fn new(token: T, ray: &Ray, reciprocal: [T::F32x8; 3], bounds: &Aabb) -> Self {
-        let slabs = N::slabs(token, ray, reciprocal, bounds);
-        Self { token, slabs }
+    pub(super) fn new(token: T, ray: &'a NarrowRay) -> Self {
+        let slabs = Self::widen(token, ray);
+        Self { token, ray, slabs }
+    }
+
+    /// Opaque to the compiler: it would load numbers several at a time, which waits for what was written one by one; and
+    /// keep vectors on the stack.
+    #[inline(always)]
+    fn widen(token: T, ray: &NarrowRay) -> N::Slabs<T> {
+        N::widen(token, black_box(ray))
     }
 }
 
-impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<T, N> {
+impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<'_, T, N> {
     type Near = N::Lanes<T>;
     type Nears = <N::Lanes<T> as Lanes>::Array;
+
+    #[inline(always)]
+    fn renew(&mut self) {
+        self.slabs = Self::widen(self.token, self.ray);
+    }
 
     #[inline(always)]
     fn margin(&self) -> f32 {

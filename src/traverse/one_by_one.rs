@@ -23,21 +23,21 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
     any: bool,
 ) -> Option<Hit> {
     // Any ray is room for one. To clear it would be a call.
-    let mut room = *ray;
-    let prepared = PreparedRay::new(ray, &mut room)?;
+    let mut scaled = *ray;
+    let prepared = PreparedRay::new(ray, &mut scaled)?;
     if bvh.root() == Child::EMPTY {
         return None;
     }
     let reciprocal = prepared.reciprocals(Portable);
-    let boxes = OneByOne::new(prepared.ray, reciprocal, bvh.bounds());
+    let mut boxes = OneByOne::new(prepared.ray, reciprocal, bvh.bounds());
     let mut finder = Finder {
-        shear: RayShear::new(&prepared, reciprocal),
+        shear: RayShear::new(Portable, &prepared, prepared.along()),
         primitives: bvh.primitives(),
         t_max: prepared.ray.t_max,
         found: None,
         any,
     };
-    walk_boxes(Portable, bvh, &boxes, prepared.ray.t_max, &mut finder);
+    walk_boxes(Portable, bvh, &mut boxes, prepared.ray.t_max, &mut finder);
     let found = finder.found?;
     Some(found.hit(ray, prepared.unscale(), bvh.primitives()))
 }

@@ -6,7 +6,7 @@ use crate::{
     layout::{Bvh, Leaves, Listed, PrimitiveLeaf, RunLeaf, Storage, WideNode},
     primitive::{PrimitiveHit, Primitives, custom::intersect},
     simd::{Operation, Simd},
-    slab::PreparedRay,
+    slab::{NarrowRay, PreparedRay},
 };
 use core::ops::ControlFlow;
 
@@ -81,8 +81,9 @@ where
             query: self,
             found: None,
         };
-        let reciprocal = prepared.reciprocals(token);
-        walk(token, bvh, prepared.ray, reciprocal, &mut visitor);
+        let mut room = NarrowRay::ROOM;
+        let narrow = NarrowRay::new(prepared, bvh.bounds(), N::WIDTH, &mut room);
+        walk(token, bvh, narrow, prepared.ray.t_max, &mut visitor);
         visitor.found
     }
 }

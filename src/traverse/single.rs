@@ -2,10 +2,9 @@
 
 use super::boxes::{AtOnce, Boxes};
 use crate::{
-    geometry::Ray,
     layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
     simd::Simd,
-    slab::reach_of,
+    slab::{NarrowRay, reach_of},
 };
 use core::{mem::MaybeUninit, ops::ControlFlow};
 
@@ -49,21 +48,20 @@ impl Entry {
 /// The children left behind: those below `len` were written, the next one last.
 type Stack = [MaybeUninit<Entry>; STACK];
 
-/// Takes `visitor` to every leaf whose box the ray passes within its range, which shrinks on the way. The ray is a
-/// prepared one's, and so are the reciprocals of its direction.
+/// Takes `visitor` to every leaf whose box the ray passes within its range, which ends at `t_max` and shrinks on the way.
 #[inline(always)]
 pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
     token: T,
     bvh: &Bvh<N, L, S>,
-    ray: &Ray,
-    reciprocal: [T::F32x8; 3],
+    ray: &NarrowRay,
+    t_max: f32,
     visitor: &mut V,
 ) {
     if bvh.root() == Child::EMPTY {
         return;
     }
-    let boxes = AtOnce::new(token, ray, reciprocal, bvh.bounds());
-    walk_boxes(token, bvh, &boxes, ray.t_max, visitor);
+    let mut boxes = AtOnce::new(token, ray);
+    walk_boxes(token, bvh, &mut boxes, t_max, visitor);
 }
 
 /// [`walk`], however boxes are tested. `bvh` is not empty.
@@ -78,7 +76,7 @@ pub(super) fn walk_boxes<
 >(
     token: T,
     bvh: &Bvh<N, L, S>,
-    boxes: &B,
+    boxes: &mut B,
     t_max: f32,
     visitor: &mut V,
 ) {
@@ -151,6 +149,7 @@ pub(super) fn walk_boxes<
             ControlFlow::Break(()) => return,
             ControlFlow::Continue(t) => t_max = reach_of(t, margin),
         }
+        boxes.renew();
         match pop(&stack, &mut len, t_max) {
             Some(link) => current = link,
             None => return,

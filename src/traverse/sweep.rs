@@ -8,7 +8,7 @@ use crate::{
     layout::{TriangleLeaf, Triangles, WideNode},
     primitive::triangle::RayShear,
     simd::{Backend, Lanes, Operation, Simd},
-    slab::{PreparedRay, reach_of},
+    slab::{NarrowRay, PreparedRay, reach_of},
 };
 
 /// How many children of `nodes`, all within `bounds`, the ray passes the boxes of. 0 for a ray that can hit nothing.
@@ -18,12 +18,12 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
         type Output = u32;
         #[inline(always)]
         fn run<T: Simd>(self, token: T) -> u32 {
-            let mut room = PreparedRay::ROOM;
-            let Some(prepared) = PreparedRay::new(self.2, &mut room) else {
+            let (mut scaled, mut room) = (PreparedRay::ROOM, NarrowRay::ROOM);
+            let Some(prepared) = PreparedRay::new(self.2, &mut scaled) else {
                 return 0;
             };
-            let reciprocal = prepared.reciprocals(token);
-            let slabs = N::slabs(token, prepared.ray, reciprocal, self.1);
+            let narrow = NarrowRay::new(&prepared, self.1, N::WIDTH, &mut room);
+            let slabs = N::widen(token, narrow);
             let t_max =
                 N::Lanes::<T>::splat(token, reach_of(prepared.ray.t_max, N::margin(&slabs)));
             let mut passed = 0;
@@ -67,7 +67,7 @@ pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> 
             let Some(prepared) = PreparedRay::new(self.1, &mut room) else {
                 return 0;
             };
-            let shear = RayShear::new(&prepared, prepared.reciprocals(token));
+            let shear = RayShear::new(token, &prepared, prepared.along());
             let mut count = 0;
             for leaf in self.0 {
                 if let Some(hits) = leaf.test::<T, true>(token, &shear, prepared.ray.t_max) {

@@ -11,7 +11,7 @@ use crate::{
     layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{RayShear, TriangleHits, bits},
     simd::{Lanes, Operation, Simd},
-    slab::{PreparedRay, unscaled},
+    slab::{NarrowRay, PreparedRay, unscaled},
 };
 use core::ops::ControlFlow;
 
@@ -136,11 +136,12 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Closest<'_, N, L,
         if T::ONE_BY_ONE {
             return one_by_one::find(self.bvh, self.ray, false);
         }
-        let mut room = PreparedRay::ROOM;
-        let prepared = PreparedRay::new(self.ray, &mut room)?;
-        let reciprocal = prepared.reciprocals(token);
-        let mut visitor = ClosestVisitor::new(token, &prepared, reciprocal, self.bvh.primitives());
-        walk(token, self.bvh, prepared.ray, reciprocal, &mut visitor);
+        let mut scaled = PreparedRay::ROOM;
+        let prepared = PreparedRay::new(self.ray, &mut scaled)?;
+        let mut room = NarrowRay::ROOM;
+        let narrow = NarrowRay::new(&prepared, self.bvh.bounds(), N::WIDTH, &mut room);
+        let mut visitor = ClosestVisitor::new(token, &prepared, narrow, self.bvh.primitives());
+        walk(token, self.bvh, narrow, prepared.ray.t_max, &mut visitor);
         visitor.hit(self.ray, &prepared)
     }
 }
@@ -155,17 +156,18 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for ClosestCounted<'_
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) -> (Option<Hit>, Counts) {
-        let mut room = PreparedRay::ROOM;
-        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+        let mut scaled = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut scaled) else {
             return (None, Counts::default());
         };
-        let reciprocal = prepared.reciprocals(token);
+        let mut room = NarrowRay::ROOM;
+        let narrow = NarrowRay::new(&prepared, self.bvh.bounds(), N::WIDTH, &mut room);
         let primitives = self.bvh.primitives();
         let mut counting = Counting {
-            visitor: ClosestVisitor::new(token, &prepared, reciprocal, primitives),
+            visitor: ClosestVisitor::new(token, &prepared, narrow, primitives),
             counts: Counts::default(),
         };
-        walk(token, self.bvh, prepared.ray, reciprocal, &mut counting);
+        walk(token, self.bvh, narrow, prepared.ray.t_max, &mut counting);
         (counting.visitor.hit(self.ray, &prepared), counting.counts)
     }
 }
@@ -183,13 +185,14 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Any<'_, N, L, S> 
         if T::ONE_BY_ONE {
             return one_by_one::find(self.bvh, self.ray, true).is_some();
         }
-        let mut room = PreparedRay::ROOM;
-        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+        let mut scaled = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut scaled) else {
             return false;
         };
-        let reciprocal = prepared.reciprocals(token);
-        let mut visitor = AnyVisitor::new(token, &prepared, reciprocal);
-        walk(token, self.bvh, prepared.ray, reciprocal, &mut visitor);
+        let mut room = NarrowRay::ROOM;
+        let narrow = NarrowRay::new(&prepared, self.bvh.bounds(), N::WIDTH, &mut room);
+        let mut visitor = AnyVisitor::new(token, &prepared, narrow);
+        walk(token, self.bvh, narrow, prepared.ray.t_max, &mut visitor);
         visitor.found
     }
 }
@@ -204,16 +207,17 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for AnyCounted<'_, N,
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) -> (bool, Counts) {
-        let mut room = PreparedRay::ROOM;
-        let Some(prepared) = PreparedRay::new(self.ray, &mut room) else {
+        let mut scaled = PreparedRay::ROOM;
+        let Some(prepared) = PreparedRay::new(self.ray, &mut scaled) else {
             return (false, Counts::default());
         };
-        let reciprocal = prepared.reciprocals(token);
+        let mut room = NarrowRay::ROOM;
+        let narrow = NarrowRay::new(&prepared, self.bvh.bounds(), N::WIDTH, &mut room);
         let mut counting = Counting {
-            visitor: AnyVisitor::new(token, &prepared, reciprocal),
+            visitor: AnyVisitor::new(token, &prepared, narrow),
             counts: Counts::default(),
         };
-        walk(token, self.bvh, prepared.ray, reciprocal, &mut counting);
+        walk(token, self.bvh, narrow, prepared.ray.t_max, &mut counting);
         (counting.visitor.found, counting.counts)
     }
 }
@@ -231,12 +235,12 @@ impl<'a, T: Simd> ClosestVisitor<'a, T> {
     fn new(
         token: T,
         prepared: &PreparedRay<'a>,
-        reciprocal: [T::F32x8; 3],
+        narrow: &NarrowRay,
         primitives: &'a [u32],
     ) -> Self {
         Self {
             token,
-            shear: RayShear::new(prepared, reciprocal),
+            shear: RayShear::new(token, prepared, narrow.along()),
             primitives,
             t_max: prepared.ray.t_max,
             found: None,
@@ -277,10 +281,10 @@ struct AnyVisitor<'a, T: Simd> {
 
 impl<'a, T: Simd> AnyVisitor<'a, T> {
     #[inline(always)]
-    fn new(token: T, prepared: &PreparedRay<'a>, reciprocal: [T::F32x8; 3]) -> Self {
+    fn new(token: T, prepared: &PreparedRay<'a>, narrow: &NarrowRay) -> Self {
         Self {
             token,
-            shear: RayShear::new(prepared, reciprocal),
+            shear: RayShear::new(token, prepared, narrow.along()),
             t_max: prepared.ray.t_max,
             found: false,
         }
