@@ -43,7 +43,7 @@ impl Case {
             rays,
             closed: false,
             flush: Flush::Never,
-            exact_every: 16,
+            exact_every: 32,
         }
     }
 }

@@ -84,6 +84,32 @@ pub fn check(
         + check_compact::<CompactNode4>(mesh, rays, expected, flush)?)
 }
 
+/// What a ray by itself is asked, and which rays are.
+#[derive(Clone, Copy)]
+enum Share {
+    /// All rays, for the closest hit and for any.
+    Whole,
+    /// All rays, for one of the two.
+    Half,
+    /// One ray in [`TURNS`], for one of the two; which, by the number.
+    Turn(usize),
+}
+
+/// Each ray is asked of each build in one of the layouts and widths: there are so many.
+const TURNS: usize = 4;
+
+impl Share {
+    /// Whether a ray is asked for the closest hit, and for any.
+    fn of(self, place: usize) -> [bool; 2] {
+        match self {
+            Self::Whole => [true; 2],
+            Self::Half => [place % 2 == 0, place % 2 == 1],
+            Self::Turn(turn) if place % TURNS == turn % TURNS => Self::Half.of(place / TURNS),
+            Self::Turn(_) => [false; 2],
+        }
+    }
+}
+
 fn check_width<N: WideNode>(
     mesh: &TriangleMesh,
     tree: &BinaryTree,
@@ -94,7 +120,7 @@ fn check_width<N: WideNode>(
     let finite = is_finite(mesh);
     let mut checked = 0;
     let mut known: Vec<Bvh<N, TriangleLeaf, Owned>> = Vec::new();
-    for build in &BUILDS {
+    for (number, build) in BUILDS.iter().enumerate() {
         let name = format!("{}, {}-wide", build.name, N::WIDTH);
         let builder = (build.builder)().drop_non_finite(!finite);
         let built = if build.from_tree {
@@ -111,23 +137,40 @@ fn check_width<N: WideNode>(
         if known.iter().any(|other| same_bytes(&bvh, other)) {
             continue;
         }
-        // Batches go the same way in all trees: some will do in those after the first.
-        let (first, most) = (known.is_empty(), rays.len());
-        let batched = &rays[..if first { most } else { most / 8 }];
-        for backend in backends(first, rays) {
+        let first = known.is_empty();
+        for (place, backend) in backends(first, rays).enumerate() {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
-            checked += flushed_if(flush, || ask(&bvh, name, [rays, batched], expected))?;
+            // Batches go the same way in all trees: some will do in those after the first.
+            let (share, batched) = match (first, place) {
+                (true, 0) => (Share::Whole, rays.len()),
+                (true, _) => (Share::Half, rays.len() / 8),
+                _ => (Share::Turn(number + N::WIDTH / 4), rays.len() / 16),
+            };
+            let batched = &rays[..batched];
+            checked += flushed_if(flush, || {
+                Ok(ask_one_by_one(&bvh, name, rays, expected, share)?
+                    + ask_at_once(&bvh, wrong(name), batched, expected)?)
+            })?;
         }
-        let some = &rays[..rays.len() / 8];
-        checked += if known.is_empty() {
+        // The same code on other memory: some will do.
+        let some = &rays[..rays.len() / 16];
+        let whole = Share::Whole;
+        checked += if first {
             let name = format!("{name}, opened");
             let bytes = written(&bvh, &name)?;
             let bvh = opened::<N, TriangleLeaf>(&bytes, &name)?;
-            flushed_if(flush, || ask(&bvh, || name.clone(), [some; 2], expected))?
+            flushed_if(flush, || {
+                Ok(
+                    ask_one_by_one(&bvh, || name.clone(), some, expected, whole)?
+                        + ask_at_once(&bvh, wrong(|| name.clone()), some, expected)?,
+                )
+            })?
         } else {
             let name = || format!("{name}, borrowed");
-            flushed_if(flush, || ask(&bvh.as_borrowed(), name, [some; 2], expected))?
+            flushed_if(flush, || {
+                ask_one_by_one(&bvh.as_borrowed(), name, some, expected, whole)
+            })?
         };
         known.push(bvh);
     }
@@ -143,7 +186,8 @@ fn check_compact<N: WideNode>(
 ) -> Result<u64, Mismatch> {
     let mut checked = 0;
     let mut known: Vec<Bvh<N, RunLeaf, Owned>> = Vec::new();
-    for build in BUILDS.iter().filter(|build| !build.from_tree) {
+    let builds = BUILDS.iter().filter(|build| !build.from_tree);
+    for (number, build) in builds.enumerate() {
         let name = format!("{}, {}-wide, compact", build.name, N::WIDTH);
         let builder = (build.builder)().drop_non_finite(!is_finite(mesh));
         let tree = builder.build_compact::<N>(mesh);
@@ -156,27 +200,32 @@ fn check_compact<N: WideNode>(
         for backend in backends(first, rays) {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
-            checked += flushed_if(flush, || ask_one_by_one(&bvh, name, rays, expected))?;
+            let share = match first {
+                true => Share::Half,
+                false => Share::Turn(number + 2 + N::WIDTH / 4),
+            };
+            checked += flushed_if(flush, || ask_one_by_one(&bvh, name, rays, expected, share))?;
         }
         if !first {
             known.push(tree);
             continue;
         }
         let at_once = wrong(|| name.clone());
-        checked += flushed_if(flush, || ask_at_once(&bvh, at_once, rays, expected))?;
-        let some = &rays[..rays.len() / 8];
+        let some = &rays[..rays.len() / 4];
+        checked += flushed_if(flush, || ask_at_once(&bvh, at_once, some, expected))?;
+        let some = &rays[..rays.len() / 16];
         let name = format!("{name}, opened");
         let bytes = written(&tree, &name)?;
         let alone = opened::<N, RunLeaf>(&bytes, &name)?;
         let alone = alone.over(mesh).map_err(|error| no_build(&name, error))?;
         checked += flushed_if(flush, || {
-            ask_one_by_one(&alone, || name.clone(), some, expected)
+            ask_one_by_one(&alone, || name.clone(), some, expected, Share::Whole)
         })?;
         let name = format!("{name} with its mesh");
         let bytes = written(&bvh, &name)?;
         let whole = opened::<N, MeshLeaf>(&bytes, &name)?;
         checked += flushed_if(flush, || {
-            ask_one_by_one(&whole, || name.clone(), some, expected)
+            ask_one_by_one(&whole, || name.clone(), some, expected, Share::Whole)
         })?;
         known.push(tree);
     }
@@ -245,17 +294,6 @@ fn same<T: bytemuck::Pod>(a: &[T], b: &[T]) -> bool {
     bytemuck::cast_slice::<T, u8>(a) == bytemuck::cast_slice::<T, u8>(b)
 }
 
-/// Every kind of call: over some rays one by one, and over the first of them, or all, at once.
-fn ask<N: WideNode, S: Storage>(
-    bvh: &Bvh<N, TriangleLeaf, S>,
-    name: impl Fn() -> String,
-    [rays, batched]: [&[Ray]; 2],
-    expected: &[Option<Hit>],
-) -> Result<u64, Mismatch> {
-    let one_by_one = ask_one_by_one(bvh, &name, rays, expected)?;
-    Ok(one_by_one + ask_at_once(bvh, wrong(name), batched, expected)?)
-}
-
 /// A call that was answered wrong.
 fn wrong(name: impl Fn() -> String) -> impl Fn(usize, &str, String) -> Mismatch {
     move |ray, call, got| Mismatch {
@@ -271,21 +309,27 @@ fn ask_one_by_one<N: WideNode, L: TriangleLeaves, S: Storage>(
     name: impl Fn() -> String,
     rays: &[Ray],
     expected: &[Option<Hit>],
+    share: Share,
 ) -> Result<u64, Mismatch> {
     let wrong = wrong(name);
     let mut checked = 0;
     for (place, (ray, expected)) in rays.iter().zip(expected).enumerate() {
-        let hit = bvh.closest_hit(ray);
-        if bits(hit) != bits(*expected) {
-            return Err(wrong(place, "closest_hit", show(hit)));
+        let [closest, any] = share.of(place);
+        if closest {
+            let hit = bvh.closest_hit(ray);
+            if bits(hit) != bits(*expected) {
+                return Err(wrong(place, "closest_hit", show(hit)));
+            }
         }
-        let any = bvh.any_hit(ray);
-        if any != expected.is_some() {
-            return Err(wrong(place, "any_hit", any.to_string()));
+        if any {
+            let any = bvh.any_hit(ray);
+            if any != expected.is_some() {
+                return Err(wrong(place, "any_hit", any.to_string()));
+            }
         }
-        checked += 2;
+        checked += u64::from(closest) + u64::from(any);
         // The same walk as above: some will do.
-        if place % 8 == 0 {
+        if closest && place % 16 == 0 {
             let (hit, _) = bvh.closest_hit_counted(ray);
             if bits(hit) != bits(*expected) {
                 return Err(wrong(place, "closest_hit_counted", show(hit)));
@@ -296,7 +340,7 @@ fn ask_one_by_one<N: WideNode, L: TriangleLeaves, S: Storage>(
     Ok(checked)
 }
 
-/// Batches over all rays, and packets of eight.
+/// Batches over all rays, and of some of them in lent memory and packets of eight.
 fn ask_at_once<N: WideNode, L: TriangleLeaves, S: Storage>(
     bvh: &Bvh<N, L, S>,
     wrong: impl Fn(usize, &str, String) -> Mismatch,
@@ -331,7 +375,7 @@ fn ask_at_once<N: WideNode, L: TriangleLeaves, S: Storage>(
     let call = ["closest_hits_in", "any_hits_in"];
     compare(call, 0, &hits[..some], &occluded[..some])?;
     // The same bundles as in batches, of fewer rays: some will do.
-    for (packet, rays) in rays.chunks_exact(8).enumerate().step_by(4) {
+    for (packet, rays) in rays.chunks_exact(8).enumerate().step_by(8) {
         let Some(rays) = rays.first_chunk::<8>() else {
             continue;
         };

@@ -15,7 +15,7 @@ const RAYS: usize = 100;
 fn at(rng: &mut Rng, mesh: Mesh, aims: &[Aim]) -> Case {
     let rays = rays(rng, &mesh, aims, Reach::NEAR, RAYS);
     Case {
-        exact_every: 32,
+        exact_every: 64,
         ..Case::of(rng, mesh, rays)
     }
 }

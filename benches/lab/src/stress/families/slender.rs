@@ -32,7 +32,7 @@ pub fn needles(rng: &mut Rng) -> Case {
     ];
     let rays = rays(rng, &mesh, &aims, Reach(-4.0, 3.0), 200);
     Case {
-        exact_every: 8,
+        exact_every: 16,
         ..Case::of(rng, mesh, rays)
     }
 }
@@ -43,7 +43,7 @@ pub fn grazing(rng: &mut Rng) -> Case {
     let aims = [Aim::Grazing, Aim::Grazing, Aim::Grazing, Aim::InPlane];
     let rays = rays(rng, &mesh, &aims, Reach(-3.0, 4.0), 200);
     Case {
-        exact_every: 8,
+        exact_every: 16,
         ..Case::of(rng, mesh, rays)
     }
 }
