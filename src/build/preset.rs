@@ -2,16 +2,17 @@
 
 /// What a hierarchy is built for: once and traced for long, or anew for every picture.
 ///
-/// The answers are the same. On one thread of an AMD EPYC (Zen 4) server, over a scan of 70,000 triangles, one of 870,000,
-/// a kitchen and three game levels:
+/// The answers are the same. On one thread of an AMD EPYC of the first Zen generation, over a scan of 70,000 triangles, one
+/// of 870,000, a kitchen and three game levels:
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 63 to 85 | 0.77 |
-/// | [`Balanced`](Self::Balanced) | 380 to 500 | 0.93 |
-/// | [`Best`](Self::Best) | 1,130 to 1,570 | 1 |
+/// | [`Fast`](Self::Fast) | 130 to 180 | 0.76 |
+/// | [`Balanced`](Self::Balanced) | 670 to 830 | 0.94 |
+/// | [`Best`](Self::Best) | 2,000 to 2,800 | 1 |
 ///
-/// What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle.
+/// A Zen 4 takes half as long. What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a
+/// triangle there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
