@@ -103,7 +103,8 @@ impl Share {
     fn of(self, place: usize) -> [bool; 2] {
         match self {
             Self::Whole => [true; 2],
-            Self::Half => [place % 2 == 0, place % 2 == 1],
+            Self::Half if place.is_multiple_of(2) => [true, false],
+            Self::Half => [false, true],
             Self::Turn(turn) if place % TURNS == turn % TURNS => Self::Half.of(place / TURNS),
             Self::Turn(_) => [false; 2],
         }
