@@ -78,10 +78,10 @@ pub fn check(
     expected: &[Option<Hit>],
     flush: bool,
 ) -> Result<u64, Mismatch> {
-    Ok(check_width::<Node8>(mesh, tree, rays, expected, flush)?
-        + check_width::<Node4>(mesh, tree, rays, expected, flush)?
-        + check_compact::<CompactNode8>(mesh, rays, expected, flush)?
-        + check_compact::<CompactNode4>(mesh, rays, expected, flush)?)
+    Ok(check_width::<Node8>(mesh, tree, rays, expected, flush, 0)?
+        + check_width::<Node4>(mesh, tree, rays, expected, flush, 1)?
+        + check_compact::<CompactNode8>(mesh, rays, expected, flush, 2)?
+        + check_compact::<CompactNode4>(mesh, rays, expected, flush, 3)?)
 }
 
 /// What a ray by itself is asked, and which rays are.
@@ -95,7 +95,7 @@ enum Share {
     Turn(usize),
 }
 
-/// Each ray is asked of each build in one of the layouts and widths: there are so many.
+/// Each ray is asked of each build in one of the layouts and widths, of which there are so many.
 const TURNS: usize = 4;
 
 impl Share {
@@ -117,6 +117,7 @@ fn check_width<N: WideNode>(
     rays: &[Ray],
     expected: &[Option<Hit>],
     flush: bool,
+    layout: usize,
 ) -> Result<u64, Mismatch> {
     let finite = is_finite(mesh);
     let mut checked = 0;
@@ -146,13 +147,12 @@ fn check_width<N: WideNode>(
             let (share, batched) = match (first, place) {
                 (true, 0) => (Share::Whole, rays.len()),
                 (true, _) => (Share::Half, rays.len() / 8),
-                _ => (Share::Turn(number + N::WIDTH / 4), rays.len() / 16),
+                // Compact layouts have none of these.
+                _ if build.from_tree => (Share::Half, rays.len() / 16),
+                _ => (Share::Turn(number + layout), rays.len() / 16),
             };
-            let batched = &rays[..batched];
-            checked += flushed_if(flush, || {
-                Ok(ask_one_by_one(&bvh, name, rays, expected, share)?
-                    + ask_at_once(&bvh, wrong(name), batched, expected)?)
-            })?;
+            let asked = [rays, &rays[..batched]];
+            checked += flushed_if(flush, || ask(&bvh, name, asked, expected, share))?;
         }
         // The same code on other memory: some will do.
         let some = &rays[..rays.len() / 16];
@@ -162,10 +162,7 @@ fn check_width<N: WideNode>(
             let bytes = written(&bvh, &name)?;
             let bvh = opened::<N, TriangleLeaf>(&bytes, &name)?;
             flushed_if(flush, || {
-                Ok(
-                    ask_one_by_one(&bvh, || name.clone(), some, expected, whole)?
-                        + ask_at_once(&bvh, wrong(|| name.clone()), some, expected)?,
-                )
+                ask(&bvh, || name.clone(), [some; 2], expected, whole)
             })?
         } else {
             let name = || format!("{name}, borrowed");
@@ -184,6 +181,7 @@ fn check_compact<N: WideNode>(
     rays: &[Ray],
     expected: &[Option<Hit>],
     flush: bool,
+    layout: usize,
 ) -> Result<u64, Mismatch> {
     let mut checked = 0;
     let mut known: Vec<Bvh<N, RunLeaf, Owned>> = Vec::new();
@@ -203,7 +201,7 @@ fn check_compact<N: WideNode>(
             let name = || format!("{name}, {}", backend.name());
             let share = match first {
                 true => Share::Half,
-                false => Share::Turn(number + 2 + N::WIDTH / 4),
+                false => Share::Turn(number + layout),
             };
             checked += flushed_if(flush, || ask_one_by_one(&bvh, name, rays, expected, share))?;
         }
@@ -293,6 +291,18 @@ fn same_runs<N: WideNode>(a: &Bvh<N, RunLeaf, Owned>, b: &Bvh<N, RunLeaf, Owned>
 
 fn same<T: bytemuck::Pod>(a: &[T], b: &[T]) -> bool {
     bytemuck::cast_slice::<T, u8>(a) == bytemuck::cast_slice::<T, u8>(b)
+}
+
+/// Every kind of call: over some rays one by one, and over others at once.
+fn ask<N: WideNode, S: Storage>(
+    bvh: &Bvh<N, TriangleLeaf, S>,
+    name: impl Fn() -> String,
+    [rays, batched]: [&[Ray]; 2],
+    expected: &[Option<Hit>],
+    share: Share,
+) -> Result<u64, Mismatch> {
+    let one_by_one = ask_one_by_one(bvh, &name, rays, expected, share)?;
+    Ok(one_by_one + ask_at_once(bvh, wrong(name), batched, expected)?)
 }
 
 /// A call that was answered wrong.
