@@ -159,7 +159,8 @@ pub trait Triangles: Copy {
         ray: &RayShear<'_, T::F32x8>,
     ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
         let corners = self.corners(token, ray);
-        let edges = ray.along(token).edges::<8>(token, corners, self.lanes());
+        let [x, y, _] = corners;
+        let edges = Edges::new(token, x, y, self.lanes());
         (corners, edges)
     }
 

@@ -80,13 +80,47 @@ pub type Corners<V> = [[V; 3]; 3];
 /// On which sides of triangles' edges a ray passes.
 #[derive(Clone, Copy)]
 pub struct Edges<V> {
+    wa: V,
     wb: V,
     wc: V,
-    determinant: V,
     least: V,
     most: V,
     /// The triangles that may be hit, a bit each.
     pub candidates: u32,
+}
+
+impl<V> Edges<V> {
+    /// The edge functions of triangles, and which of them, of those that `lanes` has a bit for, may be hit. `x` and `y` are
+    /// those of [`Sheared`] for the three corners.
+    ///
+    /// Nothing here is of `z`: most leaves end here, and theirs is never put in order.
+    #[inline(always)]
+    pub(crate) fn new<const N: usize>(
+        token: V::Token,
+        [ax, bx, cx]: [V; 3],
+        [ay, by, cy]: [V; 3],
+        lanes: u32,
+    ) -> Self
+    where
+        V: Vector<N>,
+    {
+        let zero = V::splat(token, 0.0);
+        let wa = cx * by - cy * bx;
+        let wb = ax * cy - ay * cx;
+        let wc = bx * ay - by * ax;
+        let (least, most) = (wa.min(wb).min(wc), wa.max(wb).max(wc));
+        // Signs are right where products overflow, too. Where both do there is none, a NaN, which `min` and `max` pass on, or
+        // pass over.
+        let missed = least.lt(zero) & zero.lt(most);
+        Self {
+            wa,
+            wb,
+            wc,
+            least,
+            most,
+            candidates: lanes & !missed.bits(),
+        }
+    }
 }
 
 impl<V: Copy + Sub<Output = V> + Mul<Output = V>> Sheared<V> {
@@ -230,52 +264,20 @@ impl RayShear<'_, F32x1> {
             self.shear(token, splat3(token, *c)),
         );
         let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-        let along = self.along(token);
-        let edges = along.edges::<1>(token, corners, 1);
+        let [x, y, _] = corners;
+        let edges = Edges::new(token, x, y, 1);
         if edges.candidates == 0 {
             return None;
         }
         let pair = self.pair(triangle);
-        let hit = along.test::<1, true, P, _>(token, corners, edges, F32x1(t_max), pair)?;
+        let hit =
+            self.along(token)
+                .test::<1, true, P, _>(token, corners, edges, F32x1(t_max), pair)?;
         Some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
 
 impl<V> Along<V> {
-    /// The edge functions of triangles, and which of them, of those that `lanes` has a bit for, may be hit. `x`, `y`
-    /// and `z` are those of [`Sheared`] for the three corners.
-    #[inline(always)]
-    pub(crate) fn edges<const N: usize>(
-        &self,
-        token: V::Token,
-        [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]: Corners<V>,
-        lanes: u32,
-    ) -> Edges<V>
-    where
-        V: Vector<N>,
-    {
-        let zero = V::splat(token, 0.0);
-        let wa = cx * by - cy * bx;
-        let wb = ax * cy - ay * cx;
-        let wc = bx * ay - by * ax;
-        let determinant = wa + wb + wc;
-        let (least, most) = (wa.min(wb).min(wc), wa.max(wb).max(wc));
-        let size = determinant.abs();
-        let finite = size.lt(V::splat(token, MAX_DETERMINANT));
-        let missed = least.lt(zero) & zero.lt(most) & finite;
-        let reciprocal = self.reciprocal;
-        let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
-        let ahead = self.t_min.le(last);
-        Edges {
-            wb,
-            wc,
-            determinant,
-            least,
-            most,
-            candidates: lanes & ahead.bits() & !missed.bits(),
-        }
-    }
-
     /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`. If `NEED_T` is not
     /// set, it is enough to know whether there are any.
     #[inline(always)]
@@ -292,17 +294,23 @@ impl<V> Along<V> {
     {
         let [[ax, bx, cx], [ay, by, cy], [az, bz, cz]] = corners;
         let Edges {
+            wa,
             wb,
             wc,
-            determinant,
             least,
             most,
             candidates,
         } = edges;
+        let reciprocal = self.reciprocal;
+        let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
+        let candidates = candidates & self.t_min.le(last).bits();
+        if candidates == 0 {
+            return None;
+        }
+        let determinant = wa + wb + wc;
         let size = determinant.abs();
         let finite = size.lt(V::splat(token, MAX_DETERMINANT));
         let zero = V::splat(token, 0.0);
-        let reciprocal = self.reciprocal;
         let (ab, ac) = (bz - az, cz - az);
         let (mut u, mut v) = (wb / determinant, wc / determinant);
         let z = az + u * ab + v * ac;

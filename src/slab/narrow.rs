@@ -1,8 +1,9 @@
 //! What the tests need of a ray, a number each: of one that is traced by itself, or of many that wait for their turn.
 
 use super::{
-    K_BOX, MAX_EXTENT, MIN_EXTENT, PreparedRay, RaySlabs, UNIT_ROUNDOFF, first_planes, pow2,
-    prepared::{MAX_RECIPROCAL, PreparedLanes, greater, lanes},
+    K_BOX, MAX_EXTENT, MIN_EXTENT, PreparedRay, RaySlabs, UNIT_ROUNDOFF, first_planes, plane_terms,
+    pow2,
+    prepared::{PreparedLanes, greater, lanes, reciprocal},
     slack,
 };
 use crate::{
@@ -10,7 +11,8 @@ use crate::{
     simd::{F32x1, Lanes, Portable, Simd, Vector, splat3},
 };
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::Vec3;
+use wide::f32x4;
 
 /// [`RaySlabs`] and more in one cache line.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -48,28 +50,23 @@ impl NarrowRay {
         width: usize,
         room: &'a mut Self,
     ) -> &'a Self {
-        let corners: &[f32; 6] = bytemuck::cast_ref(bounds);
+        let [lx, ly, lz, hx, hy, hz]: [f32; 6] = bytemuck::cast(*bounds);
         // As `RaySlabs::of_lanes`, but an axis a lane; what is in the fourth is of no meaning.
         let [origin, direction] = lanes(prepared.ray);
-        let [lo, hi] = [
-            Vec4::from_slice(&corners[..4]),
-            Vec4::from_slice(&corners[2..]).yzwx(),
-        ];
-        let reciprocal = (1.0 / direction)
-            .max(Vec4::splat(-MAX_RECIPROCAL))
-            .min(Vec4::splat(MAX_RECIPROCAL));
-        let [x, y, z, _] = (lo.abs().max(hi.abs()) + origin.abs()).to_array();
+        let (lo, hi) = (f32x4::new([lx, ly, lz, hx]), f32x4::new([hx, hy, hz, lz]));
+        let reciprocal = reciprocal(Portable, direction);
+        let [x, y, z, _] = (Vector::max(lo.abs(), hi.abs()) + origin.abs()).to_array();
         let extent = greater(greater(greater(x, y), z), MIN_EXTENT);
-        let at_origin = -(origin * reciprocal);
-        let error = Vec4::splat(extent * (K_BOX * UNIT_ROUNDOFF)) * reciprocal.abs();
+        let error = f32x4::splat(extent * (K_BOX * UNIT_ROUNDOFF));
+        let (near, far) = plane_terms(Portable, origin, reciprocal, error);
 
         let direction = prepared.ray.direction;
         let side = width * size_of::<f32>();
         let numbers: &mut [f32; 16] = bytemuck::cast_mut(room);
         // The fourth of each is written over.
         numbers[..4].copy_from_slice(&reciprocal.to_array());
-        numbers[3..7].copy_from_slice(&(at_origin - error).to_array());
-        numbers[6..10].copy_from_slice(&(at_origin + error).to_array());
+        numbers[3..7].copy_from_slice(&near.to_array());
+        numbers[6..10].copy_from_slice(&far.to_array());
         room.along = numbers[prepared.number as usize / 2 % 4];
         room.first = [
             first_planes(0, direction.x, side) as u32,

@@ -2,9 +2,9 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Portable, Simd, Vector, splat3},
+    simd::{Lanes, Portable, Simd, Vector, splat3},
 };
-use glam::Vec4;
+use wide::f32x4;
 
 /// A ray that can hit something, in numbers that the kernels can work with.
 ///
@@ -34,11 +34,11 @@ const LONG_DIRECTION: f32 = pow2(24);
 
 /// Above this a reciprocal is cut off, so that a direction component that is zero, or next to it, needs no
 /// branch and makes no 0 · ∞. What it must satisfy is said in [`slab`](super).
-pub(super) const MAX_RECIPROCAL: f32 = pow2(48);
+const MAX_RECIPROCAL: f32 = pow2(48);
 
 /// 1 / direction, a component, no greater in magnitude than [`MAX_RECIPROCAL`].
 #[inline(always)]
-fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
+pub(super) fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
     (V::splat(token, 1.0) / direction)
         .max(V::splat(token, -MAX_RECIPROCAL))
         .min(V::splat(token, MAX_RECIPROCAL))
@@ -240,11 +240,12 @@ pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
 
 /// x, y and z of the origin and of the direction. The fourth number of each is of no meaning.
 #[inline(always)]
-pub(super) fn lanes(ray: &Ray) -> [Vec4; 2] {
+pub(super) fn lanes(ray: &Ray) -> [f32x4; 2] {
     let numbers: &[f32; 8] = bytemuck::cast_ref(ray);
+    let [ox, oy, oz, dx, dy, dz, t_min, _] = *numbers;
     [
-        Vec4::from_slice(&numbers[..4]),
-        Vec4::from_slice(&numbers[3..7]),
+        f32x4::new([ox, oy, oz, dx]),
+        f32x4::new([dx, dy, dz, t_min]),
     ]
 }
 
@@ -257,8 +258,9 @@ fn is_finite(ray: &Ray) -> bool {
         return numbers[..6].iter().all(|x| x * 0.0 == 0.0);
     }
     let [origin, direction] = lanes(ray);
-    let zeros = origin * 0.0 + direction * 0.0;
-    zeros.cmpeq(Vec4::ZERO).bitmask() & 0b111 == 0b111
+    let zero = f32x4::ZERO;
+    let zeros = origin * zero + direction * zero;
+    Vector::le(zeros, zero).bits() & 0b111 == 0b111
 }
 
 /// The number of the axes of the shear, `largest` being the direction's largest component. Without branches, for which axis
@@ -273,9 +275,9 @@ fn axes_number(ray: &Ray, largest: f32) -> u32 {
         return (2 * z + usize::from(negative)) as u32;
     }
     let [_, direction] = lanes(ray);
-    let largest = direction.abs().cmpeq(Vec4::splat(largest));
-    let z = largest.bitmask().trailing_zeros();
-    2 * z + (direction.is_negative_bitmask() >> (z % 4) & 1)
+    let largest = Vector::le(f32x4::splat(largest), direction.abs());
+    let z = largest.bits().trailing_zeros();
+    2 * z + (direction.bits() >> (z % 4) & 1)
 }
 
 /// Writes `ray` with its direction scaled so that the largest component is in [1, 2), or as near as powers

@@ -13,7 +13,7 @@ use crate::{
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::{
         exact::{Pair, Pairs},
-        triangle::{Along, RayShear, Sheared, bits},
+        triangle::{Along, Edges, RayShear, Sheared, bits},
     },
     simd::{Lanes, Simd, Vector, load_all, splat3},
     slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reach, reciprocals},
@@ -462,7 +462,8 @@ impl<T: Simd> Packet<T> {
                 corners
             };
             let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-            let mut edges = self.along.edges(token, corners, lanes);
+            let [x, y, _] = corners;
+            let mut edges = Edges::new(token, x, y, lanes);
             let pairs = OneTriangle {
                 triangles: leaf,
                 triangle,
