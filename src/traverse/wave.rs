@@ -216,7 +216,9 @@ impl Lane {
         // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
         // 32 bits hold.
         let node = nodes.wrapping_byte_add(self.current.node_offset()).addr();
-        let leaf = bvh.leaf_address(self.current.leaf()).addr();
+        // Below the bottom there is no leaf, and to ask for what is nowhere near costs a walk through the page tables.
+        let place = select_unpredictable(self.current == BOTTOM, 0, self.current.leaf());
+        let leaf = bvh.leaf_address(place).addr();
         let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
         token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
     }
