@@ -159,8 +159,7 @@ pub trait Triangles: Copy {
         ray: &RayShear<'_, T::F32x8>,
     ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
         let corners = self.corners(token, ray);
-        let [x, y, _] = corners;
-        let edges = Edges::new(token, x, y, self.lanes());
+        let edges = Edges::new(token, corners, self.lanes());
         (corners, edges)
     }
 

@@ -90,15 +90,13 @@ pub struct Edges<V> {
 }
 
 impl<V> Edges<V> {
-    /// The edge functions of triangles, and which of them, of those that `lanes` has a bit for, may be hit. `x` and `y` are
-    /// those of [`Sheared`] for the three corners.
+    /// The edge functions of triangles, and which of them, of those that `lanes` has a bit for, may be hit.
     ///
     /// Nothing here is of `z`: most leaves end here, and theirs is never put in order.
     #[inline(always)]
     pub(crate) fn new<const N: usize>(
         token: V::Token,
-        [ax, bx, cx]: [V; 3],
-        [ay, by, cy]: [V; 3],
+        [[ax, bx, cx], [ay, by, cy], _]: Corners<V>,
         lanes: u32,
     ) -> Self
     where
@@ -110,7 +108,7 @@ impl<V> Edges<V> {
         let wc = bx * ay - by * ax;
         let (least, most) = (wa.min(wb).min(wc), wa.max(wb).max(wc));
         // Signs are right where products overflow, too. Where both do there is none, a NaN, which `min` and `max` pass on, or
-        // pass over.
+        // pass over. Where a corner has overflowed itself they say nothing, but the rest of the test finds a miss there, too.
         let missed = least.lt(zero) & zero.lt(most);
         Self {
             wa,
@@ -264,8 +262,7 @@ impl RayShear<'_, F32x1> {
             self.shear(token, splat3(token, *c)),
         );
         let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-        let [x, y, _] = corners;
-        let edges = Edges::new(token, x, y, 1);
+        let edges = Edges::new(token, corners, 1);
         if edges.candidates == 0 {
             return None;
         }

@@ -462,8 +462,7 @@ impl<T: Simd> Packet<T> {
                 corners
             };
             let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-            let [x, y, _] = corners;
-            let mut edges = Edges::new(token, x, y, lanes);
+            let mut edges = Edges::new(token, corners, lanes);
             let pairs = OneTriangle {
                 triangles: leaf,
                 triangle,
