@@ -4,7 +4,7 @@ use super::{
     Borrowed, Bvh, LayoutError, Leaves, Storage, TriangleLeaf, TriangleLeaves, Triangles, WideNode,
 };
 use crate::{
-    primitive::triangle::{Corners, InFloats, RayShear},
+    primitive::triangle::{InFloats, Look, Precision, RayShear, TriangleHits},
     simd::Simd,
 };
 use core::{marker::PhantomData, ops::Range};
@@ -79,6 +79,7 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
 
 impl<R: Triangles> Triangles for ApproximateRef<R> {
     type Precision = InFloats;
+    type Lanes<S: Simd> = R::Lanes<S>;
 
     #[inline(always)]
     fn first(self) -> usize {
@@ -91,8 +92,19 @@ impl<R: Triangles> Triangles for ApproximateRef<R> {
     }
 
     #[inline(always)]
-    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
-        self.0.corners(token, ray)
+    fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<R::Lanes<S>> {
+        self.0.look(token, ray)
+    }
+
+    #[inline(always)]
+    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+        self,
+        token: S,
+        ray: &RayShear,
+        look: Look<R::Lanes<S>>,
+        t_max: f32,
+    ) -> Option<TriangleHits<R::Lanes<S>>> {
+        self.0.finish::<S, P, NEED_T>(token, ray, look, t_max)
     }
 
     #[inline(always)]

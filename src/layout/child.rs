@@ -32,7 +32,7 @@ impl Child {
     }
 
     /// Leaf number `index`, less than 2^31 - 1, of which 31 bits count. Of a leaf that is a run of the list of primitive
-    /// numbers ([`RunLeaf`](super::RunLeaf)) it is its place in the list, with the number of them less one in bits 28 to 30.
+    /// numbers ([`RunLeaf`](super::RunLeaf)) it is its place in the list, with the number of them less one in bits 29 and 30.
     #[inline]
     pub const fn leaf(index: u32) -> Self {
         Self(index | Self::LEAF)

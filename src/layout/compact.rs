@@ -9,7 +9,7 @@ use super::{Child, ChildKind, Link, node::impl_wide_node};
 use crate::{
     geometry::Aabb,
     layout::run,
-    simd::{Simd, Vector, packed_run},
+    simd::{Lanes, Simd, Vector, packed_run},
     slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs, pow2},
 };
 use bytemuck::{Pod, Zeroable};
@@ -111,7 +111,7 @@ impl Frame {
     }
 }
 
-/// Where a compact node's children are. Leaves have up to 8 primitives.
+/// Where a compact node's children are. Leaves have up to 4 primitives.
 pub trait Head: Pod + Debug {
     /// The head, and its byte in the frame, of a node whose child nodes begin at `nodes` and whose primitives begin at
     /// `units`. `counts` are the primitives of each child, none of a node.
@@ -343,7 +343,12 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
 
     #[inline(always)]
     fn present<V: Vector<W>>(&self, token: V::Token, hit: V) -> V {
-        hit & V::of_bits(token, (1 << self.lanes()) - 1)
+        hit & V::of_bits(token, self.present_bits(u32::MAX))
+    }
+
+    #[inline(always)]
+    fn present_bits(&self, hit: u32) -> u32 {
+        hit & ((1 << self.lanes()) - 1)
     }
 
     /// # Safety
@@ -393,7 +398,7 @@ mod tests {
                 node += 1;
                 Child::node(node)
             } else {
-                let len = rng.u32(1..=8);
+                let len = rng.u32(1..=4);
                 unit += len;
                 Child::leaf(packed_run(unit - len, len))
             };

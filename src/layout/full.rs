@@ -3,7 +3,7 @@
 use super::{Child, Link, node::impl_wide_node};
 use crate::{
     geometry::Aabb,
-    simd::{Simd, Vector},
+    simd::{Lanes, Simd, Vector},
     slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs},
 };
 use bytemuck::{Pod, Zeroable};
@@ -98,6 +98,11 @@ impl<const W: usize, A> Node<W, A> {
     /// All: a lane without a child has a box that no ray passes.
     #[inline(always)]
     fn present<V: Vector<W>>(&self, _: V::Token, hit: V) -> V {
+        hit
+    }
+
+    #[inline(always)]
+    fn present_bits(&self, hit: u32) -> u32 {
         hit
     }
 

@@ -3,10 +3,11 @@
 use super::{
     Listed, Triangles,
     bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
+    leaves::OneRay,
 };
 use crate::{
-    primitive::triangle::{Corners, Exact, RayShear},
-    simd::{Simd, Vector},
+    primitive::triangle::{Exact, Look, Precision, RayShear, TriangleHits},
+    simd::Simd,
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, ops::Range};
@@ -100,20 +101,11 @@ impl TriangleLeaf {
             count: count as u32,
         }
     }
-
-    /// A number of each vertex as that of each triangle's first, second and third corner.
-    #[inline(always)]
-    fn corners_of<V: Vector<8>>(&self, vertices: V) -> [V; 3] {
-        [
-            vertices.permute(&self.corners[0]),
-            vertices.permute(&self.corners[1]),
-            vertices.permute(&self.corners[2]),
-        ]
-    }
 }
 
 impl Triangles for &TriangleLeaf {
     type Precision = Exact;
+    type Lanes<S: Simd> = S::F32x8;
 
     #[inline(always)]
     fn shared<'a>(self) -> Option<&'a TriangleLeaf>
@@ -134,13 +126,26 @@ impl Triangles for &TriangleLeaf {
     }
 
     #[inline(always)]
-    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
+    fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<S::F32x8> {
         let vertices = ray.shear_arrays(token, &self.vertices);
-        [
-            self.corners_of(vertices.x),
-            self.corners_of(vertices.y),
-            self.corners_of(vertices.z),
-        ]
+        let [a, b, c] = &self.corners;
+        let corners = [
+            vertices.permute(a),
+            vertices.permute(b),
+            vertices.permute(c),
+        ];
+        Look::new(token, corners, self.lanes())
+    }
+
+    #[inline(always)]
+    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+        self,
+        token: S,
+        ray: &RayShear,
+        look: Look<S::F32x8>,
+        t_max: f32,
+    ) -> Option<TriangleHits<S::F32x8>> {
+        look.finish::<8, NEED_T, P, _>(token, ray, t_max, OneRay(self, ray))
     }
 
     #[inline(always)]
@@ -183,7 +188,7 @@ pub struct PrimitiveLeaf {
 
 impl PrimitiveLeaf {
     /// The most primitives a leaf holds. A bound of the builder's: more in a leaf is slow.
-    pub const MAX_PRIMITIVES: usize = 8;
+    pub const MAX_PRIMITIVES: usize = 4;
 
     /// A leaf of `count` primitives, whose numbers begin at `first` in the hierarchy's list.
     pub const fn new(first: u32, count: u32) -> Self {

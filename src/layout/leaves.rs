@@ -4,7 +4,7 @@ use super::{Borrowed, LayoutError, Leaf, Storage, TriangleLeaf};
 use crate::{
     primitive::{
         exact::{Pair, Pairs},
-        triangle::{Corners, Edges, Precision, RayShear, TriangleHits},
+        triangle::{Look, Precision, RayShear, TriangleHits},
     },
     simd::{Lanes, Simd},
 };
@@ -121,20 +121,30 @@ impl<L: Leaf> Leaves for L {
     }
 }
 
-/// Up to 8 triangles: what the one triangle test needs of a leaf.
+/// A few triangles: what the one triangle test needs of a leaf.
 #[doc(hidden)]
 pub trait Triangles: Copy {
     /// How they are tested.
     type Precision: Precision;
+    /// A number of each, in a backend's vector.
+    type Lanes<S: Simd>: Lanes<Token = S>;
 
     /// Where their numbers begin in the hierarchy's list.
     fn first(self) -> usize;
     /// How many there are.
     fn count(self) -> usize;
-    /// Their corners as the ray sees them. What stands in lanes past the last triangle is finite if they all are.
-    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8>;
     /// The corners of the triangle in a lane, of which there are [`count`](Self::count).
     fn triangle(self, lane: usize) -> [[f32; 3]; 3];
+    /// Which of them the ray may hit, and what the rest of the test works on.
+    fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<Self::Lanes<S>>;
+    /// The rest of the test, in some precision.
+    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+        self,
+        token: S,
+        ray: &RayShear,
+        look: Look<Self::Lanes<S>>,
+        t_max: f32,
+    ) -> Option<TriangleHits<Self::Lanes<S>>>;
 
     /// The leaf, if it has vertices that triangles share.
     #[inline(always)]
@@ -151,55 +161,39 @@ pub trait Triangles: Copy {
         (1 << self.count()) - 1
     }
 
-    /// Their corners as the ray sees them, and which of them the ray may hit: what the rest of the test works on.
-    #[inline(always)]
-    fn edges<T: Simd>(
-        self,
-        token: T,
-        ray: &RayShear<'_, T::F32x8>,
-    ) -> (Corners<T::F32x8>, Edges<T::F32x8>) {
-        let corners = self.corners(token, ray);
-        let edges = Edges::new(token, corners, self.lanes());
-        (corners, edges)
-    }
-
     /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit.
     #[inline(always)]
-    fn test<T: Simd, const NEED_T: bool>(
+    fn test<S: Simd, const NEED_T: bool>(
         self,
-        token: T,
-        ray: &RayShear<'_, T::F32x8>,
+        token: S,
+        ray: &RayShear,
         t_max: f32,
-    ) -> Option<TriangleHits<T::F32x8>> {
-        let (corners, edges) = self.edges(token, ray);
-        if edges.candidates == 0 {
+    ) -> Option<TriangleHits<Self::Lanes<S>>> {
+        let look = self.look(token, ray);
+        if !look.may_hit() {
             return None;
         }
-        let t_max = T::F32x8::splat(token, t_max);
-        self.hits::<T, NEED_T>(token, ray, corners, edges, t_max)
+        self.hits::<S, NEED_T>(token, ray, look, t_max)
     }
 
     /// The rest of the test.
     #[inline(always)]
-    fn hits<T: Simd, const NEED_T: bool>(
+    fn hits<S: Simd, const NEED_T: bool>(
         self,
-        token: T,
-        ray: &RayShear<'_, T::F32x8>,
-        corners: Corners<T::F32x8>,
-        edges: Edges<T::F32x8>,
-        t_max: T::F32x8,
-    ) -> Option<TriangleHits<T::F32x8>> {
-        let pairs = OneRay(self, ray);
-        (ray.along(token))
-            .test::<8, NEED_T, Self::Precision, _>(token, corners, edges, t_max, pairs)
+        token: S,
+        ray: &RayShear,
+        look: Look<Self::Lanes<S>>,
+        t_max: f32,
+    ) -> Option<TriangleHits<Self::Lanes<S>>> {
+        self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max)
     }
 }
 
 /// A ray against all triangles of a leaf.
 #[derive(Clone, Copy)]
-struct OneRay<'a, R, V>(R, &'a RayShear<'a, V>);
+pub(super) struct OneRay<'a, R>(pub R, pub &'a RayShear<'a>);
 
-impl<R: Triangles, V: Copy> Pairs for OneRay<'_, R, V> {
+impl<R: Triangles> Pairs for OneRay<'_, R> {
     #[inline(always)]
     fn pair(&self, lane: usize) -> Pair {
         self.1.pair(&self.0.triangle(lane))

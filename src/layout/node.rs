@@ -48,7 +48,7 @@ pub trait WideNode: Pod + sealed::Sealed {
         token: S,
         slabs: &BundleSlabs,
         t_max: Self::Lanes<S>,
-    ) -> (Self::Lanes<S>, Self::Lanes<S>);
+    ) -> (u32, Self::Lanes<S>);
     /// The planes of a child's box that rays of this direction meet first, and those they meet last.
     #[doc(hidden)]
     fn child_planes(&self, lane: usize, direction: Vec3) -> [[f32; 3]; 2];
@@ -66,9 +66,17 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// By how much the greatest `t` is to be raised for [`test`](Self::test).
     #[doc(hidden)]
     fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32;
-    /// Which children the ray may meet up to `t_max`, as a comparison's outcome, and from which `t` on.
+    /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
     #[doc(hidden)]
     fn test<S: Simd>(
+        &self,
+        token: S,
+        slabs: &Self::Slabs<S>,
+        t_max: Self::Lanes<S>,
+    ) -> (u32, Self::Lanes<S>);
+    /// The same, which children as a comparison's outcome.
+    #[doc(hidden)]
+    fn test_lanes<S: Simd>(
         &self,
         token: S,
         slabs: &Self::Slabs<S>,
@@ -84,7 +92,8 @@ pub(super) mod sealed {
 /// - be made of children, say whether only of ordered ones: `new`, `ORDERED`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
-/// - say how many lanes may have a child, and unset the others of a comparison's outcome: `lanes`, `present`;
+/// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
+///   `present_bits`;
 /// - say where a lane, or every one, leads: `link`, `link_lanes`.
 macro_rules! impl_wide_node {
     ($node:ty, $kind:literal, $width:literal, $vector:ident, $bytes:literal) => {
@@ -135,10 +144,10 @@ macro_rules! impl_wide_node {
                 token: S,
                 slabs: &BundleSlabs,
                 t_max: Self::Lanes<S>,
-            ) -> (Self::Lanes<S>, Self::Lanes<S>) {
+            ) -> (u32, Self::Lanes<S>) {
                 let planes = self.planes::<S::$vector>(token, slabs.first());
                 let (hit, near) = slabs.test(token, planes, t_max);
-                (self.present(token, hit), near)
+                (self.present_bits(hit.bits()), near)
             }
 
             #[inline(always)]
@@ -169,6 +178,18 @@ macro_rules! impl_wide_node {
 
             #[inline(always)]
             fn test<S: Simd>(
+                &self,
+                token: S,
+                slabs: &Self::Slabs<S>,
+                t_max: Self::Lanes<S>,
+            ) -> (u32, Self::Lanes<S>) {
+                let [near, far] = self.planes::<S::$vector>(token, slabs.first());
+                let (hit, near) = slabs.between(near, far, t_max);
+                (self.present_bits(hit.bits()), near)
+            }
+
+            #[inline(always)]
+            fn test_lanes<S: Simd>(
                 &self,
                 token: S,
                 slabs: &Self::Slabs<S>,

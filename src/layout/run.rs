@@ -1,15 +1,17 @@
 //! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
 
-use super::{Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode};
+use super::{
+    Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode, leaves::OneRay,
+};
 use crate::{
     geometry::TriangleMesh,
-    primitive::triangle::{Corners, Exact, RayShear},
+    primitive::triangle::{Exact, Look, Precision, RayShear, TriangleHits},
     simd::{Lanes, RUN_FIRST_BITS, Simd, packed_run},
 };
 use core::{error::Error, fmt, ops::Range};
 
 /// The most primitives of a run.
-pub(crate) const MAX_RUN: usize = 8;
+pub(crate) const MAX_RUN: usize = 4;
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 
@@ -17,17 +19,17 @@ const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 #[inline(always)]
 pub(crate) const fn of_place(place: usize) -> Range<usize> {
     let first = place & FIRST as usize;
-    first..first + (place >> RUN_FIRST_BITS & 7) + 1
+    first..first + (place >> RUN_FIRST_BITS & 3) + 1
 }
 
-/// Leaves of up to 8 primitives, which are read from an `M`.
+/// Leaves of up to 4 primitives, which are read from an `M`.
 #[derive(Clone, Copy, Debug)]
 pub struct Runs<M>(M);
 
-/// Leaves of up to 8 primitives, of which the hierarchy knows the numbers alone. What they are is told to each query
+/// Leaves of up to 4 primitives, of which the hierarchy knows the numbers alone. What they are is told to each query
 /// ([`Primitives`](crate::primitive::Primitives)); or, if they are triangles, to the hierarchy: [`Bvh::over`].
 pub type RunLeaf = Runs<()>;
-/// Leaves of up to 8 triangles of a mesh, which are read where the mesh has them.
+/// Leaves of up to 4 triangles of a mesh, which are read where the mesh has them.
 pub type MeshLeaf<'m> = Runs<TriangleMesh<'m>>;
 
 /// A leaf of a run.
@@ -140,6 +142,7 @@ impl Listed for Run<'_, ()> {
 
 impl Triangles for Run<'_, TriangleMesh<'_>> {
     type Precision = Exact;
+    type Lanes<S: Simd> = S::F32x4;
 
     #[inline(always)]
     fn first(self) -> usize {
@@ -152,7 +155,7 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
     }
 
     #[inline(always)]
-    fn corners<T: Simd>(self, token: T, ray: &RayShear<'_, T::F32x8>) -> Corners<T::F32x8> {
+    fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<S::F32x4> {
         let (indices, positions) = (self.of.indices(), self.of.positions());
         let Range { start, end } = self.range();
         let mut triangles = [&[0; 3]; MAX_RUN];
@@ -164,19 +167,35 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
                 indices.get_unchecked(number as usize)
             };
         }
-        let mut corners = [[<T::F32x8 as Lanes>::splat(token, 0.0); 3]; 3];
+        // No closure: it would not inherit the target's features.
+        let nowhere = [S::F32x4::splat(token, 0.0); 3];
+        let mut corners = [nowhere; 3];
         for corner in 0..3 {
             let mut vertices = [&[0.0; 3]; MAX_RUN];
             for (vertex, triangle) in vertices.iter_mut().zip(triangles) {
                 // SAFETY: a mesh's indices are within its positions.
                 *vertex = unsafe { positions.get_unchecked(triangle[corner] as usize) };
             }
-            let sheared = ray.shear(token, token.coordinates(vertices));
-            corners[0][corner] = sheared.x;
-            corners[1][corner] = sheared.y;
-            corners[2][corner] = sheared.z;
+            corners[corner] = token.coordinates(vertices);
         }
-        corners
+        let [a, b, c] = corners;
+        let corners = [
+            ray.shear(token, a),
+            ray.shear(token, b),
+            ray.shear(token, c),
+        ];
+        Look::new(token, corners, self.lanes())
+    }
+
+    #[inline(always)]
+    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+        self,
+        token: S,
+        ray: &RayShear,
+        look: Look<S::F32x4>,
+        t_max: f32,
+    ) -> Option<TriangleHits<S::F32x4>> {
+        look.finish::<4, NEED_T, P, _>(token, ray, t_max, OneRay(self, ray))
     }
 
     #[inline(always)]

@@ -48,12 +48,12 @@ impl Precision for InFloats {
 /// What the triangle test needs of a ray. Numbers are spread over the lanes when they are needed: that costs
 /// no more than to load a vector, and many rays never get to a leaf.
 #[derive(Clone, Copy)]
-pub struct RayShear<'a, V> {
+pub struct RayShear<'a> {
     ray: &'a Ray,
     /// Of the shear.
     axes: &'static [usize; 3],
     /// Of the direction's component along z.
-    reciprocal: V,
+    reciprocal: f32,
 }
 
 /// What the test needs to know along a ray, or along as many rays as there are lanes.
@@ -121,6 +121,68 @@ impl<V> Edges<V> {
     }
 }
 
+/// What a first look at triangles has brought: their corners as the ray sees them, and which of them it may hit.
+#[derive(Clone, Copy)]
+pub struct Look<V> {
+    corners: Corners<V>,
+    edges: Edges<V>,
+}
+
+impl<V> Look<V> {
+    /// Of triangles with these first, second and third corners, those that `lanes` has a bit for.
+    #[inline(always)]
+    pub(crate) fn new<const N: usize>(
+        token: V::Token,
+        [a, b, c]: [Sheared<V>; 3],
+        lanes: u32,
+    ) -> Self
+    where
+        V: Vector<N>,
+    {
+        let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
+        let edges = Edges::new(token, corners, lanes);
+        Self { corners, edges }
+    }
+
+    /// Whether any may be hit.
+    #[inline(always)]
+    pub(crate) fn may_hit(&self) -> bool {
+        self.edges.candidates != 0
+    }
+
+    /// The rest of the test, of the same ray: [`Along::test`].
+    #[inline(always)]
+    pub(crate) fn finish<const N: usize, const NEED_T: bool, P: Precision, O: Pairs>(
+        self,
+        token: V::Token,
+        ray: &RayShear,
+        t_max: f32,
+        pairs: O,
+    ) -> Option<TriangleHits<V>>
+    where
+        V: Vector<N>,
+    {
+        let Self { corners, edges } = self;
+        let t_max = V::splat(token, t_max);
+        (ray.along(token)).test::<N, NEED_T, P, O>(token, corners, edges, t_max, pairs)
+    }
+}
+
+impl<V> Sheared<V> {
+    /// Those in other lanes: in lane `i` is the one of lane `lanes[i]`.
+    #[inline(always)]
+    pub(crate) fn permute<const N: usize>(self, lanes: &[u8; N]) -> Self
+    where
+        V: Vector<N>,
+    {
+        Self {
+            x: self.x.permute(lanes),
+            y: self.y.permute(lanes),
+            z: self.z.permute(lanes),
+        }
+    }
+}
+
 impl<V: Copy + Sub<Output = V> + Mul<Output = V>> Sheared<V> {
     /// Vertices along the axes of the shear, for rays from `origin` with `slope`: how far they go along x and y for one
     /// unit along z.
@@ -148,23 +210,16 @@ pub struct TriangleHits<V> {
 const MIN_DETERMINANT: f32 = pow2(-100);
 const MAX_DETERMINANT: f32 = pow2(126);
 
-impl<'a, V: Copy> RayShear<'a, V> {
+impl<'a> RayShear<'a> {
     /// `along` is [`PreparedRay::along`].
     #[inline(always)]
-    pub(crate) fn new<const N: usize>(
-        token: V::Token,
-        prepared: &PreparedRay<'a>,
-        along: f32,
-    ) -> Self
-    where
-        V: Vector<N>,
-    {
-        Self::of(prepared.ray, prepared.axes, V::splat(token, along))
+    pub(crate) fn new(prepared: &PreparedRay<'a>, along: f32) -> Self {
+        Self::of(prepared.ray, prepared.axes, along)
     }
 
     /// Of a prepared ray, its axes and the reciprocal along the last of them.
     #[inline(always)]
-    pub(crate) fn of(ray: &'a Ray, axes: &'static [usize; 3], reciprocal: V) -> Self {
+    pub(crate) fn of(ray: &'a Ray, axes: &'static [usize; 3], reciprocal: f32) -> Self {
         Self {
             ray,
             axes,
@@ -174,7 +229,7 @@ impl<'a, V: Copy> RayShear<'a, V> {
 
     /// Moves and shears vertices, given as arrays of x, of y and of z.
     #[inline(always)]
-    pub(crate) fn shear_arrays<const N: usize>(
+    pub(crate) fn shear_arrays<const N: usize, V>(
         &self,
         token: V::Token,
         vertices: &[[f32; N]; 3],
@@ -195,7 +250,7 @@ impl<'a, V: Copy> RayShear<'a, V> {
 
     /// The same of vectors.
     #[inline(always)]
-    pub(crate) fn shear<const N: usize>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
+    pub(crate) fn shear<const N: usize, V>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
     where
         V: Vector<N>,
     {
@@ -207,7 +262,7 @@ impl<'a, V: Copy> RayShear<'a, V> {
 
     /// The same of vectors along the axes of the shear.
     #[inline(always)]
-    fn shear_along<const N: usize>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
+    fn shear_along<const N: usize, V>(&self, token: V::Token, vertices: [V; 3]) -> Sheared<V>
     where
         V: Vector<N>,
     {
@@ -219,8 +274,8 @@ impl<'a, V: Copy> RayShear<'a, V> {
             (self.ray.origin.as_ref(), self.ray.direction.as_ref());
         let origin = splat3(token, [origin[kx], origin[ky], origin[kz]]);
         let slope = [
-            V::splat(token, direction[kx]) * self.reciprocal,
-            V::splat(token, direction[ky]) * self.reciprocal,
+            V::splat(token, direction[kx] * self.reciprocal),
+            V::splat(token, direction[ky] * self.reciprocal),
         ];
         Sheared::new(vertices, origin, slope)
     }
@@ -233,18 +288,18 @@ impl<'a, V: Copy> RayShear<'a, V> {
 
     /// What the rest of the test needs of the ray.
     #[inline(always)]
-    pub(crate) fn along<const N: usize>(&self, token: V::Token) -> Along<V>
+    pub(crate) fn along<const N: usize, V>(&self, token: V::Token) -> Along<V>
     where
         V: Vector<N>,
     {
         Along {
-            reciprocal: self.reciprocal,
+            reciprocal: V::splat(token, self.reciprocal),
             t_min: V::splat(token, self.ray.t_min),
         }
     }
 }
 
-impl RayShear<'_, F32x1> {
+impl RayShear<'_> {
     /// One triangle: `t`, `u` and `v` if it is hit within the ray's range up to `t_max`.
     ///
     /// A call, for there to be one of it.
@@ -256,20 +311,16 @@ impl RayShear<'_, F32x1> {
     ) -> Option<[f32; 3]> {
         let token = Portable;
         let [a, b, c] = triangle;
-        let (a, b, c) = (
+        let (a, b, c): (Sheared<F32x1>, _, _) = (
             self.shear(token, splat3(token, *a)),
             self.shear(token, splat3(token, *b)),
             self.shear(token, splat3(token, *c)),
         );
-        let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
-        let edges = Edges::new(token, corners, 1);
-        if edges.candidates == 0 {
+        let look = Look::new(token, [a, b, c], 1);
+        if !look.may_hit() {
             return None;
         }
-        let pair = self.pair(triangle);
-        let hit =
-            self.along(token)
-                .test::<1, true, P, _>(token, corners, edges, F32x1(t_max), pair)?;
+        let hit = look.finish::<1, true, P, _>(token, self, t_max, self.pair(triangle))?;
         Some([hit.t.0, hit.u.0, hit.v.0])
     }
 }

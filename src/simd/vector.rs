@@ -29,10 +29,10 @@ pub trait Simd: Copy {
         load_all(self, &columns)
     }
 
-    /// Eight points' x, y and z.
+    /// Four points' x, y and z.
     #[inline(always)]
-    fn coordinates(self, points: [&[f32; 3]; 8]) -> [Self::F32x8; 3] {
-        let mut axes = [[0.0; 8]; 3];
+    fn coordinates(self, points: [&[f32; 3]; 4]) -> [Self::F32x4; 3] {
+        let mut axes = [[0.0; 4]; 3];
         for (lane, point) in points.into_iter().enumerate() {
             for (axis, &x) in axes.iter_mut().zip(point) {
                 axis[lane] = x;
@@ -40,9 +40,9 @@ pub trait Simd: Copy {
         }
         let [x, y, z] = &axes;
         [
-            Self::F32x8::load(self, x),
-            Self::F32x8::load(self, y),
-            Self::F32x8::load(self, z),
+            Self::F32x4::load(self, x),
+            Self::F32x4::load(self, y),
+            Self::F32x4::load(self, z),
         ]
     }
 
@@ -156,12 +156,12 @@ pub trait Vector<const N: usize>:
 }
 
 /// How many bits of a run say where it begins; those above say how long it is, less 1.
-pub(crate) const RUN_FIRST_BITS: u32 = 28;
+pub(crate) const RUN_FIRST_BITS: u32 = 29;
 
-/// A run of `count` things, 1 to 8, from number `first` on, in 31 bits.
+/// A run of `count` things, 1 to 4, from number `first` on, in 31 bits.
 #[inline(always)]
 pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
-    first & ((1 << RUN_FIRST_BITS) - 1) | (count.wrapping_sub(1) & 7) << RUN_FIRST_BITS
+    first & ((1 << RUN_FIRST_BITS) - 1) | (count.wrapping_sub(1) & 3) << RUN_FIRST_BITS
 }
 
 /// Eight vectors.

@@ -70,8 +70,7 @@ impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<'_, T, N> {
     #[inline(always)]
     fn test(&self, node: &N, t_max: f32) -> (u32, N::Lanes<T>) {
         let t_max = N::Lanes::<T>::splat(self.token, t_max);
-        let (hit, near) = node.test(self.token, &self.slabs, t_max);
-        (hit.bits(), near)
+        node.test(self.token, &self.slabs, t_max)
     }
 
     #[inline(always)]

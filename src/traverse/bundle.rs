@@ -173,7 +173,7 @@ pub(super) fn count_boxes<T: Simd, N: WideNode>(
     let mut passed = 0;
     for node in nodes {
         let (hit, _) = node.test_bundle(token, &bundle.slabs, far);
-        passed += hit.bits().count_ones();
+        passed += hit.count_ones();
     }
     Some(passed)
 }
@@ -265,7 +265,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 let (hit, near) = node.test_bundle(token, &self.slabs, far);
                 let near = near.to_array();
                 let base = len;
-                for lane in bits(hit.bits()) {
+                for lane in bits(hit) {
                     // SAFETY: `hit` has bits for the node's lanes alone, `near` is of as many.
                     let (link, near) = unsafe {
                         let link = node.link(lane);
@@ -531,7 +531,7 @@ impl<T: Simd> Packet<T> {
             let Some(ray) = rays.get(lane) else {
                 break;
             };
-            let shear = RayShear::of(ray, axes, V::<T>::splat(token, reciprocals[lane]));
+            let shear = RayShear::of(ray, axes, reciprocals[lane]);
             let mut t_max = t_max[lane];
             if !Q::CLOSEST {
                 let hit = leaf.test::<T, false>(token, &shear, t_max).is_some();

@@ -10,7 +10,7 @@ use crate::{
     geometry::{Hit, Ray},
     layout::{Bvh, Child, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::RayShear,
-    simd::{F32x1, Portable},
+    simd::Portable,
     slab::PreparedRay,
 };
 use core::ops::ControlFlow;
@@ -31,7 +31,7 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
     let reciprocal = prepared.reciprocals(Portable);
     let mut boxes = OneByOne::new(prepared.ray, reciprocal, bvh.bounds());
     let mut finder = Finder {
-        shear: RayShear::new(Portable, &prepared, prepared.along()),
+        shear: RayShear::new(&prepared, prepared.along()),
         primitives: bvh.primitives(),
         t_max: prepared.ray.t_max,
         found: None,
@@ -43,7 +43,7 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
 }
 
 struct Finder<'a> {
-    shear: RayShear<'a, F32x1>,
+    shear: RayShear<'a>,
     primitives: &'a [u32],
     t_max: f32,
     found: Option<Found>,

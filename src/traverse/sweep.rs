@@ -29,7 +29,7 @@ pub fn count_boxes<N: WideNode>(backend: Backend, nodes: &[N], bounds: &Aabb, ra
             let mut passed = 0;
             // No closure: it would not inherit the target's features.
             for node in self.0 {
-                passed += node.test(token, &slabs, t_max).0.bits().count_ones();
+                passed += node.test(token, &slabs, t_max).0.count_ones();
             }
             passed
         }
@@ -67,7 +67,7 @@ pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> 
             let Some(prepared) = PreparedRay::new(self.1, &mut room) else {
                 return 0;
             };
-            let shear = RayShear::new(token, &prepared, prepared.along());
+            let shear = RayShear::new(&prepared, prepared.along());
             let mut count = 0;
             for leaf in self.0 {
                 if let Some(hits) = leaf.test::<T, true>(token, &shear, prepared.ray.t_max) {

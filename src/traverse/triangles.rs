@@ -60,27 +60,28 @@ impl Found {
         best: &mut Option<Self>,
         t_max: &mut f32,
         leaf: impl Triangles,
-        shear: &RayShear<'_, T::F32x8>,
+        shear: &RayShear,
         primitives: &[u32],
     ) -> bool {
         let Some(hits) = leaf.test::<T, true>(token, shear, *t_max) else {
             return false;
         };
-        Self::choose::<T>(best, t_max, leaf, hits, primitives)
+        Self::choose(best, t_max, leaf, hits, primitives)
     }
 
     /// Takes note of hits in `leaf`, none farther than `t_max`, which becomes the best one's. Whether there is a new
     /// best one.
     #[inline(always)]
-    pub(super) fn choose<T: Simd>(
+    pub(super) fn choose<V: Lanes>(
         best: &mut Option<Self>,
         t_max: &mut f32,
         leaf: impl Triangles,
-        hits: TriangleHits<T::F32x8>,
+        hits: TriangleHits<V>,
         primitives: &[u32],
     ) -> bool {
         let mut any_closer = false;
         let (t, u, v) = (hits.t.to_array(), hits.u.to_array(), hits.v.to_array());
+        let (t, u, v) = (t.as_ref(), u.as_ref(), v.as_ref());
         for lane in bits(hits.mask) {
             let found = Self {
                 t: t[lane],
@@ -224,7 +225,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for AnyCounted<'_, N,
 
 struct ClosestVisitor<'a, T: Simd> {
     token: T,
-    shear: RayShear<'a, T::F32x8>,
+    shear: RayShear<'a>,
     primitives: &'a [u32],
     t_max: f32,
     found: Option<Found>,
@@ -240,7 +241,7 @@ impl<'a, T: Simd> ClosestVisitor<'a, T> {
     ) -> Self {
         Self {
             token,
-            shear: RayShear::new(token, prepared, narrow.along()),
+            shear: RayShear::new(prepared, narrow.along()),
             primitives,
             t_max: prepared.ray.t_max,
             found: None,
@@ -274,7 +275,7 @@ impl<L: TriangleLeaves, T: Simd> Visitor<L> for ClosestVisitor<'_, T> {
 
 struct AnyVisitor<'a, T: Simd> {
     token: T,
-    shear: RayShear<'a, T::F32x8>,
+    shear: RayShear<'a>,
     t_max: f32,
     found: bool,
 }
@@ -284,7 +285,7 @@ impl<'a, T: Simd> AnyVisitor<'a, T> {
     fn new(token: T, prepared: &PreparedRay<'a>, narrow: &NarrowRay) -> Self {
         Self {
             token,
-            shear: RayShear::new(token, prepared, narrow.along()),
+            shear: RayShear::new(prepared, narrow.along()),
             t_max: prepared.ray.t_max,
             found: false,
         }

@@ -14,8 +14,8 @@
 use super::{feed::Feed, query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
-    primitive::triangle::{Corners, Edges, RayShear},
+    layout::{Bvh, Leaves, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
+    primitive::triangle::{Look, RayShear},
     simd::{Lanes, Simd},
     slab::{NarrowRay, reach_of},
 };
@@ -50,7 +50,7 @@ pub(super) struct Lane {
 }
 
 /// What a first look at a leaf has brought.
-type Look<T> = (Corners<<T as Simd>::F32x8>, Edges<<T as Simd>::F32x8>);
+type LookAt<'a, T, L> = Look<<<L as Leaves>::Ref<'a> as Triangles>::Lanes<T>>;
 
 /// Traces all rays of `feed`, on `lanes`.
 #[inline(always)]
@@ -74,7 +74,7 @@ pub(super) fn trace<
     // What comes after nodes: leaves, those of them with candidates, and ends.
     let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
     // Apart, so that lists are short and what they are of is together.
-    let mut looks = [const { MaybeUninit::<Look<T>>::uninit() }; LANES];
+    let mut looks = [const { MaybeUninit::<LookAt<T, L>>::uninit() }; LANES];
     let root = Link::new::<N>(bvh.root());
     for (lane, state) in lanes.iter_mut().enumerate() {
         let started = Lane::start(state, root, feed);
@@ -186,7 +186,7 @@ impl Lane {
         let node = unsafe { &*nodes.byte_add(self.current.node_offset()) };
         let slabs = N::widen(token, &self.narrow);
         let far = N::Lanes::<T>::splat(token, self.far);
-        let (hit, near) = node.test(token, &slabs, far);
+        let (hit, near) = node.test_lanes(token, &slabs, far);
         let mask = hit.bits();
         let links = node.link_lanes(token);
         // Read once: it might be in what is written below, for all that the compiler sees.
@@ -225,14 +225,14 @@ impl Lane {
 
     /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
     #[inline(always)]
-    fn look_at_leaf<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
+    fn look_at_leaf<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
         &mut self,
         token: T,
-        bvh: &Bvh<N, L, S>,
-        look: &mut MaybeUninit<Look<T>>,
+        bvh: &'a Bvh<N, L, S>,
+        look: &mut MaybeUninit<LookAt<'a, T, L>>,
     ) -> bool {
-        let (_, edges) = look.write(self.leaf(bvh).edges(token, &self.shear(token)));
-        let stays = edges.candidates != 0;
+        let look = look.write(self.leaf(bvh).look(token, &self.shear()));
+        let stays = look.may_hit();
         // SAFETY: `top` and those below were written.
         let last = unsafe { self.links.get_unchecked(self.top as usize).assume_init() };
         self.current = select_unpredictable(stays, self.current, last);
@@ -242,25 +242,24 @@ impl Lane {
 
     /// Tests the leaf's triangles, and goes on to the stack's last entry, or the end if enough is known.
     #[inline(always)]
-    fn test_triangles<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+    fn test_triangles<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
         token: T,
-        bvh: &Bvh<N, L, S>,
-        &(corners, edges): &Look<T>,
+        bvh: &'a Bvh<N, L, S>,
+        &look: &LookAt<'a, T, L>,
     ) {
-        let t_max = T::F32x8::splat(token, self.t_max);
-        let (leaf, shear) = (self.leaf(bvh), self.shear(token));
+        let (leaf, shear, t_max) = (self.leaf(bvh), self.shear(), self.t_max);
         if Q::CLOSEST {
-            let hits = leaf.hits::<T, true>(token, &shear, corners, edges, t_max);
+            let hits = leaf.hits::<T, true>(token, &shear, look, t_max);
             if let Some(hits) = hits {
                 let primitives = bvh.primitives();
                 let best = &mut self.found;
-                if Found::choose::<T>(best, &mut self.t_max, leaf, hits, primitives) {
+                if Found::choose(best, &mut self.t_max, leaf, hits, primitives) {
                     self.far = reach_of(self.t_max, self.narrow.margin());
                     self.forget_the_far();
                 }
             }
-        } else if (leaf.hits::<T, false>(token, &shear, corners, edges, t_max)).is_some() {
+        } else if (leaf.hits::<T, false>(token, &shear, look, t_max)).is_some() {
             self.found = Some(Found::default());
             self.current = BOTTOM;
             return;
@@ -296,9 +295,8 @@ impl Lane {
     }
 
     #[inline(always)]
-    fn shear<T: Simd>(&self, token: T) -> RayShear<'_, T::F32x8> {
-        let reciprocal = T::F32x8::splat(token, self.narrow.along());
-        RayShear::of(&self.ray, self.narrow.axes(), reciprocal)
+    fn shear(&self) -> RayShear<'_> {
+        RayShear::of(&self.ray, self.narrow.axes(), self.narrow.along())
     }
 }
 

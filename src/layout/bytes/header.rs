@@ -45,7 +45,8 @@ const _: () = assert!(size_of::<Header>() == 128);
 
 const MAGIC: [u8; 8] = *b"wide-bvh";
 const BYTE_ORDER: u32 = 0x0102_0304;
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+
 impl Header {
     /// That of a hierarchy with so many leaves, positions and triangles.
     ///
