@@ -9,6 +9,7 @@ use super::{
     input::Input,
     lay_out::prune,
     monitor::{STRIDE, Watch},
+    pages,
     parallel::{TASK, join},
     refs::{Bounds, Ref, Refs},
     split::Cut,
@@ -16,7 +17,7 @@ use super::{
 };
 use crate::simd::{Backend, Operation, Simd};
 use bytemuck::Zeroable;
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 
 /// Below this the heuristic is given up for halves: so a cut that takes off little each time costs neither the
 /// square of the time nor the stack, on which there are 64 levels, another 24 of halves and 63 of sweeps at most.
@@ -54,7 +55,7 @@ pub(super) fn subtree<I: Input>(
     watch: &Watch,
 ) -> Vec<BinaryNode> {
     let centers = bounds_of_centers(refs);
-    let mut nodes = vec![BinaryNode::zeroed(); 2 * refs.len() - 1];
+    let mut nodes = pages::filled(BinaryNode::zeroed(), 2 * refs.len() - 1);
     if let [root, nodes @ ..] = &mut nodes[..] {
         Task {
             input,

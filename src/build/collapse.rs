@@ -14,6 +14,7 @@ use super::{
     emit::Shape,
     input::{Input, leaf_of},
     monitor::{STRIDE, Watch},
+    pages,
     sweep::Leaves,
 };
 use crate::{
@@ -63,7 +64,7 @@ impl<'a, const W: usize> Collapse<'a, W> {
     /// Of a tree in our order, whose leaves all fit, and are as full as they can be where it was built to have such.
     pub fn new<I: Input>(input: &I, tree: &'a BinaryTree, leaves: Leaves, watch: &Watch) -> Self {
         let nodes = tree.nodes();
-        let mut entries = vec![Entry::NONE; nodes.len()];
+        let mut entries = pages::filled(Entry::NONE, nodes.len());
         if let Some(root) = nodes.first() {
             let solver = Solver::<W, I> {
                 input,

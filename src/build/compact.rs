@@ -1,6 +1,6 @@
 //! Compact hierarchies from full ones: the same tree, its boxes on the grids of the nodes.
 
-use super::BuildError;
+use super::{BuildError, pages};
 use crate::{
     geometry::Aabb,
     layout::{
@@ -18,7 +18,7 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
     full: &Bvh<N, PrimitiveLeaf, Owned>,
 ) -> Result<Bvh<C, RunLeaf, Owned>, BuildError> {
     // Leaves' primitives in the order of leaves, which a builder along a curve has not.
-    let mut primitives = Vec::with_capacity(full.primitives().len());
+    let mut primitives = pages::with_capacity(full.primitives().len());
     let run = |leaf: &PrimitiveLeaf| {
         let first = primitives.len() as u32;
         primitives.extend_from_slice(&full.primitives()[leaf.range()]);
@@ -41,7 +41,8 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
                 .chain(children.filter(is_leaf)),
         )
     };
-    let nodes: Vec<C> = full.nodes().iter().map(node).collect();
+    let mut nodes = pages::with_capacity::<C>(full.nodes().len());
+    nodes.extend(full.nodes().iter().map(node));
     let bounds = tested_bounds(&nodes, *full.bounds());
     let count = primitives.len();
     let compact = Bvh::from_parts(nodes, (), primitives, bounds).map_err(|error| match error {

@@ -8,12 +8,14 @@ use super::{
     cuts::Cuts,
     input::{Input, leaf_of},
     monitor::Watch,
+    pages,
 };
 use crate::{
     geometry::Aabb,
     layout::{Child, LayoutError, STACK, WideNode},
     simd::{Backend, Operation, Simd},
 };
+use bytemuck::Zeroable;
 use core::{marker::PhantomData, ops::Range};
 use std::vec::Vec;
 
@@ -135,7 +137,7 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
             return Ok(Vec::new());
         }
         // Most trees have more than four leaves a wide node. What is not used is not touched.
-        let mut nodes = Vec::with_capacity(shape.len() / 8 + 1);
+        let mut nodes = pages::with_capacity(shape.len() / 8 + 1);
         let mut leaves = 0;
         let root = shape.root();
         let measure = Measure::of_bounds(shape.aabb(root));
@@ -201,7 +203,7 @@ fn fill<I: Input>(
     ranges: &[Range<usize>],
     watch: &Watch,
 ) -> Result<(Vec<I::Leaf>, Vec<u32>), LayoutError> {
-    let mut primitives = Vec::with_capacity(order.len());
+    let mut primitives = pages::with_capacity(order.len());
     let mut ends = Vec::with_capacity(ranges.len() + 1);
     ends.push(0);
     for range in ranges {
@@ -220,22 +222,24 @@ fn fill<I: Input>(
         ends.push(primitives.len());
     }
     let backend = Backend::detect();
-    let leaf = |(index, ends): (usize, &[usize])| {
+    let mut leaves = pages::filled(I::Leaf::zeroed(), ranges.len());
+    let fill = |(index, (leaf, ends)): (usize, (&mut I::Leaf, &[usize]))| {
         watch.advance(1);
         let ids = &primitives[ends[0]..ends[1]];
-        leaf_of(backend, input, ids, ends[0] as u32).ok_or(LayoutError::Leaf(index))
+        let filled = leaf_of(backend, input, ids, ends[0] as u32);
+        *leaf = filled.ok_or(LayoutError::Leaf(index))?;
+        Ok(())
     };
     #[cfg(feature = "rayon")]
-    let leaves = {
+    {
         use rayon::prelude::*;
-        let ends = ends.par_windows(2).enumerate();
-        ends.map(leaf).collect::<Result<_, _>>()
-    };
+        let with_ends = leaves.par_iter_mut().zip(ends.par_windows(2));
+        with_ends.enumerate().try_for_each(fill)?;
+    }
     #[cfg(not(feature = "rayon"))]
-    let leaves = ends
-        .windows(2)
-        .enumerate()
-        .map(leaf)
-        .collect::<Result<_, _>>();
-    Ok((leaves?, primitives))
+    {
+        let with_ends = leaves.iter_mut().zip(ends.windows(2));
+        with_ends.enumerate().try_for_each(fill)?;
+    }
+    Ok((leaves, primitives))
 }

@@ -7,6 +7,7 @@ use super::{
     leaf_collapse::LeafCollapse,
     monitor::Watch,
     morton::{self, Curve},
+    pages,
     ploc::{self, Node},
     runs::{self, Runs},
 };
@@ -69,7 +70,7 @@ impl<T: Copy> Operation for InOrder<'_, T> {
 
     #[inline(always)]
     fn run<S: Simd>(self, token: S) -> Vec<T> {
-        let mut copies = Vec::with_capacity(self.order.len());
+        let mut copies = pages::with_capacity(self.order.len());
         for (index, &place) in self.order.iter().enumerate() {
             if let Some(&later) = self.order.get(index + AHEAD) {
                 token.prefetch((&raw const self.all[later as usize]).cast());
@@ -94,8 +95,8 @@ impl<L: Copy + Send> Grown<L> {
     fn with_room(primitives: usize) -> Self {
         let leaves = primitives / 8 * 3 + 1;
         Self {
-            leaves: Vec::with_capacity(leaves),
-            nodes: Vec::with_capacity(2 * leaves),
+            leaves: pages::with_capacity(leaves),
+            nodes: pages::with_capacity(2 * leaves),
             roots: Vec::new(),
         }
     }

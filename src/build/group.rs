@@ -13,10 +13,11 @@ use super::{
     input::{Input, leaf_of},
     lay_out::{Part, below_inner, lay_out},
     monitor::Watch,
+    pages,
 };
 use crate::{geometry::Aabb, simd::Backend};
 use core::ops::ControlFlow;
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 
 /// The most primitives that a leaf of any kind has.
 const MAX_LEAF: usize = 8;
@@ -95,11 +96,11 @@ pub(super) fn group<I: Input, const W: usize>(
 
     // The group that a node has become, and how many there are below a node. Below a group there is none.
     const NONE: u32 = u32::MAX;
-    let mut group_at = vec![NONE; tree.nodes().len()];
+    let mut group_at = pages::filled(NONE, tree.nodes().len());
     for (group, index) in groups.iter().zip(0..) {
         group_at[group.node] = index;
     }
-    let mut counts = vec![0; tree.nodes().len()];
+    let mut counts = pages::filled(0, tree.nodes().len());
     for (index, node) in tree.nodes().iter().enumerate().rev() {
         if group_at[index] != NONE {
             counts[index] = 1;
@@ -109,7 +110,7 @@ pub(super) fn group<I: Input, const W: usize>(
         }
     }
 
-    let mut order = Vec::with_capacity(tree.order().len());
+    let mut order = pages::with_capacity(tree.order().len());
     let nodes = lay_out(groups.len(), 0, |mut index: usize, _| {
         loop {
             if let Some(group) = groups.get(group_at[index] as usize) {

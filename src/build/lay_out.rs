@@ -7,6 +7,7 @@
 use super::{
     binary::{BinaryNode, BinaryTree},
     monitor::Watch,
+    pages,
     sweep::Leaves,
 };
 use crate::geometry::Aabb;
@@ -19,7 +20,7 @@ pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves, watch: &Watch) -> Ve
     if leaves.below == 0.0 {
         return nodes;
     }
-    let mut counts = vec![1u32; nodes.len()];
+    let mut counts = pages::filled(1u32, nodes.len());
     for (index, node) in nodes.iter().enumerate().rev() {
         if !node.is_leaf() {
             let [left, right] = node.children();
@@ -82,7 +83,7 @@ pub(super) fn lay_out<T>(
     root: T,
     mut part: impl FnMut(T, usize) -> Part<T>,
 ) -> Vec<BinaryNode> {
-    let mut nodes = vec![BinaryNode::zeroed(); 2 * leaves - 1];
+    let mut nodes = pages::filled(BinaryNode::zeroed(), 2 * leaves - 1);
     // A part, its place, and that of the nodes below it.
     let mut todo = vec![(root, 0, 1)];
     while let Some((old, place, below)) = todo.pop() {

@@ -8,6 +8,7 @@ use super::{
     emit::Shape,
     input::Input,
     monitor::{STRIDE, Watch},
+    pages,
     ploc::Node,
 };
 use crate::{
@@ -86,8 +87,8 @@ impl<I: Input, const W: usize> Operation for Solve<'_, I, W> {
     /// Every node after those below it.
     #[inline(always)]
     fn run<S: Simd>(self, token: S) -> Vec<Cuts> {
-        let mut forests = Vec::<Forest>::with_capacity(self.nodes.len());
-        let mut all = Vec::with_capacity(self.nodes.len());
+        let mut forests = pages::with_capacity::<Forest>(self.nodes.len());
+        let mut all = pages::with_capacity(self.nodes.len());
         for nodes in self.nodes.chunks(STRIDE) {
             self.watch.advance(nodes.len());
             for node in nodes {

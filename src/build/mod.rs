@@ -53,6 +53,7 @@ mod lay_out;
 mod leaf_collapse;
 mod monitor;
 mod morton;
+mod pages;
 mod parallel;
 mod pieces;
 mod pipeline;

@@ -6,9 +6,10 @@ use super::{
     BuildError,
     input::Input,
     monitor::Watch,
+    pages,
     refs::{Bounds, gather},
 };
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 use wide::f32x4;
 
 /// Bits of a code along each axis, and of a digit of the sort.
@@ -135,12 +136,12 @@ fn sorted(mut keys: Vec<u64>) -> Vec<u32> {
             counts[digit(key, place)] += 1;
         }
     }
-    let mut other = vec![0; keys.len()];
+    let mut other = pages::filled(0, keys.len());
     let [low, middle, high] = counts;
     sort_by_digit(0, low, &keys, &mut other, |key| key);
     sort_by_digit(1, middle, &other, &mut keys, |key| key);
     drop(other);
-    let mut order = vec![0; keys.len()];
+    let mut order = pages::filled(0, keys.len());
     sort_by_digit(2, high, &keys, &mut order, id);
     order
 }
@@ -208,7 +209,7 @@ mod tests {
     /// A grid around points of which none is used would have all in one cell.
     #[test]
     fn unused_points_far_away() {
-        let mut positions = vec![[1e30, -1e38, f32::MAX]];
+        let mut positions = std::vec![[1e30, -1e38, f32::MAX]];
         for i in (0..100).rev() {
             let x = i as f32;
             positions.extend([[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]]);

@@ -5,13 +5,14 @@ use super::{
     cost::Measure,
     input::{Input, Verdict},
     monitor::Watch,
+    pages,
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
     simd::{Backend, Operation, Simd},
 };
 use glam::Vec3;
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 use wide::f32x4;
 
 /// A primitive's box, scaled by the scene's [`Measure`], and its number.
@@ -210,7 +211,7 @@ pub(super) fn gather<I: Input, T: Copy + Send>(
         return Err(BuildError::TooManyPrimitives(input.len()));
     }
     watch.phase(GATHERED, input.len())?;
-    let mut all = vec![none; input.len()];
+    let mut all = pages::filled(none, input.len());
     let backend = Backend::detect();
     let gather = |(chunk, all): (usize, &mut [T])| {
         watch.advance(all.len());

@@ -11,6 +11,7 @@ use super::{
     cost::Measure,
     lay_out::{Part, lay_out},
     monitor::Watch,
+    pages,
     refs::Bounds,
 };
 use glam::Vec3;
@@ -84,9 +85,9 @@ pub(super) fn optimize(
     let measure = Measure::of_bounds(&root.aabb);
     let mut spots = spots(tree.nodes(), &measure);
     let mut touched = vec![false; spots.len()];
-    let mut rests = vec![Rest::default(); spots.len()];
+    let mut rests = pages::filled(Rest::default(), spots.len());
     let least_gain = effort.least_gain * spots.iter().map(|spot| f64::from(spot.area)).sum::<f64>();
-    let mut keys = Vec::with_capacity(spots.len());
+    let mut keys = pages::with_capacity(spots.len());
     let mut looks = 0;
     for _ in 0..effort.rounds {
         let candidates = candidates(&spots, &mut rests, effort.share, &mut keys);
@@ -124,22 +125,20 @@ pub(super) fn optimize(
 
 fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
     let vector = |v: Vec3| f32x4::new([v.x, v.y, v.z, 0.0]) * measure.scale();
-    let mut spots: Vec<_> = nodes
-        .iter()
-        .map(|node| {
-            let bounds = Bounds {
-                min: vector(node.aabb.min),
-                max: vector(node.aabb.max),
-            };
-            Spot {
-                bounds,
-                area: bounds.half_area(),
-                parent: 0,
-                first: node.first,
-                count: node.count,
-            }
-        })
-        .collect();
+    let mut spots = pages::with_capacity(nodes.len());
+    spots.extend(nodes.iter().map(|node| {
+        let bounds = Bounds {
+            min: vector(node.aabb.min),
+            max: vector(node.aabb.max),
+        };
+        Spot {
+            bounds,
+            area: bounds.half_area(),
+            parent: 0,
+            first: node.first,
+            count: node.count,
+        }
+    }));
     for (index, node) in nodes.iter().enumerate() {
         if !node.is_leaf() {
             for child in node.children() {
@@ -329,8 +328,8 @@ fn refit_up(spots: &mut [Spot], mut index: u32) {
 /// The changed tree, in our order.
 fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
     // How many leaves are below each node: by a walk from the root, back.
-    let mut counts = vec![1u32; spots.len()];
-    let mut walk = Vec::with_capacity(spots.len());
+    let mut counts = pages::filled(1u32, spots.len());
+    let mut walk = pages::with_capacity(spots.len());
     walk.push(0);
     let mut next = 0;
     while let Some(&index) = walk.get(next) {
@@ -349,13 +348,13 @@ fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
     }
 
     // Leaves are told by their places in the old order, which gives their exact boxes.
-    let mut leaf_at = vec![0; tree.order().len()];
+    let mut leaf_at = pages::filled(0, tree.order().len());
     for (node, index) in tree.nodes().iter().zip(0u32..) {
         if node.is_leaf() {
             leaf_at[node.first as usize] = index;
         }
     }
-    let mut order = Vec::with_capacity(tree.order().len());
+    let mut order = pages::with_capacity(tree.order().len());
     let nodes = lay_out(counts[0] as usize, 0, |index: usize, _| {
         let first = spots[index].first as usize;
         if spots[index].count == 0 {
