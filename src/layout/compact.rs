@@ -228,9 +228,9 @@ impl Head for Head4 {
         if count == 0 {
             return Link::node::<N>((self.nodes & Self::PLACE) + lane);
         }
+        // Three counts of 4 at most: their sum has room in 4 bits.
         let before = counts & ((1 << (4 * lane)) - 1);
-        let pairs = (before & 0x0f0f) + (before >> 4 & 0x0f0f);
-        let start = (pairs + (pairs >> 8)) & 0xff;
+        let start = before.wrapping_mul(0x111) >> 8 & 15;
         leaf(self.units & Self::PLACE, start, start + count)
     }
 
