@@ -197,17 +197,17 @@ impl Lane {
         unsafe {
             let last = self.links.get_unchecked(top).assume_init();
             let above_links = self.links.as_mut_ptr().add(above).cast();
+            // The nearest; or the first, which is the largest.
             let child = if Q::CLOSEST {
-                let nearest = near.least(hit);
-                let others = mask & !(1 << nearest);
-                near.compress(others, self.nears.as_mut_ptr().add(above).cast());
-                links.compress(others, above_links);
-                nearest
+                near.least(hit)
             } else {
-                // The last of those written is popped at once.
-                links.compress(mask, above_links);
-                (31 ^ (mask | 1).leading_zeros()) as usize
+                mask.trailing_zeros() as usize % N::WIDTH
             };
+            let others = mask & !(1 << child);
+            links.compress(others, above_links);
+            if Q::CLOSEST {
+                near.compress(others, self.nears.as_mut_ptr().add(above).cast());
+            }
             let child = node.link(child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
