@@ -117,7 +117,7 @@ pub trait Head: Pod + Debug {
     /// `units`. `counts` are the primitives of each child, none of a node.
     #[doc(hidden)]
     fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8);
-    /// How many children there are.
+    /// How many children there are; of a node that is none, less than 16.
     #[doc(hidden)]
     fn children(&self, more: u8) -> usize;
     /// Where a child is. `N` are the nodes.
@@ -160,7 +160,7 @@ impl Head for Head8 {
 
     #[inline(always)]
     fn children(&self, more: u8) -> usize {
-        more as usize
+        more as usize % 16
     }
 
     #[inline(always)]
@@ -348,7 +348,7 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
 
     #[inline(always)]
     fn present_bits(&self, hit: u32) -> u32 {
-        hit & ((1 << self.lanes()) - 1)
+        hit & ((1 << self.head.children(self.frame.more)) - 1)
     }
 
     /// # Safety
@@ -356,6 +356,15 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
     #[inline(always)]
     unsafe fn link(&self, lane: usize) -> Link {
         self.head.link::<Self>(self.frame.more, lane)
+    }
+
+    /// # Safety
+    /// There is such a lane.
+    #[inline(always)]
+    unsafe fn link_among<V: Vector<W>>(&self, links: V, lane: usize) -> Link {
+        let links = links.to_array();
+        // SAFETY: the caller's promise: there are `W` lanes.
+        Link::from_bits(unsafe { links.get_unchecked(lane) }.to_bits())
     }
 
     #[inline(always)]

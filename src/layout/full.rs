@@ -114,6 +114,14 @@ impl<const W: usize, A> Node<W, A> {
         unsafe { *self.links.get_unchecked(lane) }
     }
 
+    /// # Safety
+    /// There is such a lane.
+    #[inline(always)]
+    unsafe fn link_among<V: Vector<W>>(&self, _: V, lane: usize) -> Link {
+        // SAFETY: the caller's promise.
+        unsafe { self.link(lane) }
+    }
+
     #[inline(always)]
     fn link_lanes<V: Vector<W>>(&self, token: V::Token) -> V {
         // SAFETY: as many links, each of a float's size and alignment.

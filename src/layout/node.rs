@@ -63,6 +63,12 @@ pub trait WideNode: Pod + sealed::Sealed {
     unsafe fn link(&self, lane: usize) -> Link;
     #[doc(hidden)]
     fn link_lanes<S: Simd>(&self, token: S) -> Self::Lanes<S>;
+    /// Where a lane leads to, `links` being where all do: without a branch.
+    ///
+    /// # Safety
+    /// There is such a lane.
+    #[doc(hidden)]
+    unsafe fn link_among<S: Simd>(&self, links: Self::Lanes<S>, lane: usize) -> Link;
     /// By how much the greatest `t` is to be raised for [`test`](Self::test).
     #[doc(hidden)]
     fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32;
@@ -94,7 +100,7 @@ pub(super) mod sealed {
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
 ///   `present_bits`;
-/// - say where a lane, or every one, leads: `link`, `link_lanes`.
+/// - say where a lane, or every one, leads: `link`, `link_lanes`, and the first by the second: `link_among`.
 macro_rules! impl_wide_node {
     ($node:ty, $kind:literal, $width:literal, $vector:ident, $bytes:literal) => {
         const _: () = assert!(size_of::<$node>() == $bytes);
@@ -169,6 +175,12 @@ macro_rules! impl_wide_node {
             #[inline(always)]
             fn link_lanes<S: Simd>(&self, token: S) -> Self::Lanes<S> {
                 self.link_lanes::<S::$vector>(token)
+            }
+
+            #[inline(always)]
+            unsafe fn link_among<S: Simd>(&self, links: S::$vector, lane: usize) -> Link {
+                // SAFETY: the caller's promise.
+                unsafe { self.link_among(links, lane) }
             }
 
             #[inline(always)]

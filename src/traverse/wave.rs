@@ -208,7 +208,7 @@ impl Lane {
             if Q::CLOSEST {
                 near.compress(others, self.nears.as_mut_ptr().add(above).cast());
             }
-            let child = node.link(child % N::WIDTH);
+            let child = node.link_among(links, child % N::WIDTH);
             self.current = select_unpredictable(mask != 0, child, last);
         }
         self.top = (top as u32 + mask.count_ones()).wrapping_sub(1);
