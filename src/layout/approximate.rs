@@ -71,6 +71,19 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
         L::address::<S>(store, primitives, place)
     }
 
+    const LEADS_ON: bool = L::LEADS_ON;
+
+    #[inline(always)]
+    unsafe fn fetch_next<T: Simd, S: Storage>(
+        token: T,
+        store: &L::Store<S>,
+        primitives: &[u32],
+        place: usize,
+    ) {
+        // SAFETY: the caller's promise.
+        unsafe { L::fetch_next::<T, S>(token, store, primitives, place) };
+    }
+
     #[inline(always)]
     fn primitives(ApproximateRef(leaf): Self::Ref<'_>) -> usize {
         L::primitives(leaf)

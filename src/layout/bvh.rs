@@ -4,7 +4,10 @@ use super::{
     Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, MeshLeaf, Node4, Node8,
     PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, check,
 };
-use crate::{geometry::Aabb, simd::Backend};
+use crate::{
+    geometry::Aabb,
+    simd::{Backend, Simd},
+};
 use core::fmt;
 
 /// A wide bounding volume hierarchy: nodes `N`, leaves `L`, memory of `S`.
@@ -113,6 +116,16 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// How the leaves are kept.
     pub(super) fn leaf_store(&self) -> &L::Store<S> {
         &self.leaves
+    }
+
+    /// Has fetched what is read next of the leaf at a place: [`Leaves::LEADS_ON`].
+    ///
+    /// # Safety
+    /// The leaf is there.
+    #[inline(always)]
+    pub(crate) unsafe fn fetch_next<T: Simd>(&self, token: T, place: usize) {
+        // SAFETY: the caller's promise.
+        unsafe { L::fetch_next::<T, S>(token, &self.leaves, &self.primitives, place) };
     }
 
     /// What is read first of the leaf at a place.

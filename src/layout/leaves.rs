@@ -64,6 +64,16 @@ pub trait Leaves: Sized {
     /// What is read first of the leaf at a place, to be fetched.
     #[doc(hidden)]
     fn address<S: Storage>(store: &Self::Store<S>, primitives: &[u32], place: usize) -> *const u8;
+    /// Whether what is read first of a leaf says where to read on.
+    #[doc(hidden)]
+    const LEADS_ON: bool = false;
+    /// Has fetched what is read next, if it does.
+    ///
+    /// # Safety
+    /// The layout's check saw that the leaf is there.
+    #[doc(hidden)]
+    #[inline(always)]
+    unsafe fn fetch_next<T: Simd, S: Storage>(_: T, _: &Self::Store<S>, _: &[u32], _place: usize) {}
     /// How many primitives a leaf has.
     #[doc(hidden)]
     fn primitives(leaf: Self::Ref<'_>) -> usize;

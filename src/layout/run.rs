@@ -44,19 +44,35 @@ pub struct Run<'a, M> {
 /// What leaves' primitives are read from.
 #[doc(hidden)]
 pub trait Numbered {
+    /// Whether a number is where something is to be read.
+    const READ: bool;
     /// How many there are, if that is known.
     fn count(&self) -> Option<usize>;
+    /// Has it fetched, if so.
+    fn fetch<T: Simd>(&self, token: T, number: u32);
 }
 
 impl Numbered for () {
+    const READ: bool = false;
+
     fn count(&self) -> Option<usize> {
         None
     }
+
+    fn fetch<T: Simd>(&self, _: T, _: u32) {}
 }
 
 impl Numbered for TriangleMesh<'_> {
+    const READ: bool = true;
+
     fn count(&self) -> Option<usize> {
         Some(self.len())
+    }
+
+    #[inline(always)]
+    fn fetch<T: Simd>(&self, token: T, number: u32) {
+        let triangle = self.indices().as_ptr().wrapping_add(number as usize);
+        token.prefetch_line(triangle.cast());
     }
 }
 
@@ -117,6 +133,16 @@ impl<M: Copy + Numbered> Leaves for Runs<M> {
     fn address<S: Storage>(_: &M, primitives: &[u32], place: usize) -> *const u8 {
         let first = place & FIRST as usize;
         primitives.as_ptr().wrapping_add(first).cast()
+    }
+
+    const LEADS_ON: bool = M::READ;
+
+    #[inline(always)]
+    unsafe fn fetch_next<T: Simd, S: Storage>(token: T, of: &M, primitives: &[u32], place: usize) {
+        for place in of_place(place) {
+            // SAFETY: the caller's promise: the run is within the list.
+            of.fetch(token, unsafe { *primitives.get_unchecked(place) });
+        }
     }
 
     #[inline(always)]

@@ -36,9 +36,14 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn prefetch(self, address: *const u8) {
         for line in 0..3 {
-            // SAFETY: the token says that the instructions are there; a prefetch never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(64 * line).cast()) };
+            self.prefetch_line(address.wrapping_add(64 * line));
         }
+    }
+
+    #[inline(always)]
+    fn prefetch_line(self, address: *const u8) {
+        // SAFETY: the token says that the instructions are there; a prefetch never faults.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) };
     }
 }
 

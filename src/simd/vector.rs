@@ -48,6 +48,8 @@ pub trait Simd: Copy {
 
     /// Has the three cache lines from `address` on fetched, if the backend can. Any address will do.
     fn prefetch(self, address: *const u8);
+    /// Has one cache line fetched.
+    fn prefetch_line(self, address: *const u8);
 }
 
 /// Some floats, one a lane. A comparison's outcome is a vector too: all bits of a lane set, or none.

@@ -30,6 +30,10 @@ const PLACES: usize = STACK + 16;
 /// What lies below all entries of a stack. It counts as a leaf.
 const BOTTOM: Link = Link::from_bits(u32::MAX);
 
+/// Over more primitives than this, of leaves that say where to read on that is fetched, too. Smaller scenes are in the
+/// caches.
+const LARGE: usize = 1 << 18;
+
 /// A ray under way.
 #[repr(C, align(64))]
 pub(super) struct Lane {
@@ -75,6 +79,7 @@ pub(super) fn trace<
     let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
     // Apart, so that lists are short and what they are of is together.
     let mut looks = [const { MaybeUninit::<LookAt<T, L>>::uninit() }; LANES];
+    let is_large = bvh.primitives().len() > LARGE;
     let root = Link::new::<N>(bvh.root());
     for (lane, state) in lanes.iter_mut().enumerate() {
         let started = Lane::start(state, root, feed);
@@ -104,6 +109,13 @@ pub(super) fn trace<
             let end = in_list(lanes, lane).current == BOTTOM;
             at_leaf.push_if(&mut leaves, lane, !end);
             at_end.push_if(&mut ends, lane, end);
+        }
+        if L::LEADS_ON && is_large {
+            for place in 0..leaves {
+                let leaf = in_list(lanes, at_leaf.get(place)).current.leaf();
+                // SAFETY: the layout's check saw that all leaves led to are there.
+                unsafe { bvh.fetch_next(token, leaf) };
+            }
         }
         for place in 0..leaves {
             let lane = at_leaf.get(place);
