@@ -187,7 +187,8 @@ pub struct PrimitiveLeaf {
 }
 
 impl PrimitiveLeaf {
-    /// The most primitives a leaf holds. A bound of the builder's: more in a leaf is slow.
+    /// The most primitives a leaf holds. A bound of the builder's: more in a leaf is slow, and more than compact nodes
+    /// can tell of.
     pub const MAX_PRIMITIVES: usize = 4;
 
     /// A leaf of `count` primitives, whose numbers begin at `first` in the hierarchy's list.
