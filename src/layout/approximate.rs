@@ -71,8 +71,6 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
         L::address::<S>(store, primitives, place)
     }
 
-    const LEADS_ON: bool = L::LEADS_ON;
-
     #[inline(always)]
     unsafe fn fetch_next<T: Simd, S: Storage>(
         token: T,

@@ -118,7 +118,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         &self.leaves
     }
 
-    /// Has fetched what is read next of the leaf at a place: [`Leaves::LEADS_ON`].
+    /// Has fetched what is read next of the leaf at a place: [`Leaves::fetch_next`].
     ///
     /// # Safety
     /// The leaf is there.

@@ -3,11 +3,11 @@
 use super::{
     Listed, Triangles,
     bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
-    leaves::OneRay,
+    leaves::in_lanes,
 };
 use crate::{
-    primitive::triangle::{Exact, Look, Precision, RayShear, TriangleHits},
-    simd::Simd,
+    primitive::triangle::{Exact, Look, RayShear},
+    simd::{MAX_RUN, Simd},
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, ops::Range};
@@ -105,7 +105,7 @@ impl TriangleLeaf {
 
 impl Triangles for &TriangleLeaf {
     type Precision = Exact;
-    type Lanes<S: Simd> = S::F32x8;
+    in_lanes!(F32x8, 8);
 
     #[inline(always)]
     fn shared<'a>(self) -> Option<&'a TriangleLeaf>
@@ -135,17 +135,6 @@ impl Triangles for &TriangleLeaf {
             vertices.permute(c),
         ];
         Look::new(token, corners, self.lanes())
-    }
-
-    #[inline(always)]
-    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
-        self,
-        token: S,
-        ray: &RayShear,
-        look: Look<S::F32x8>,
-        t_max: f32,
-    ) -> Option<TriangleHits<S::F32x8>> {
-        look.finish::<8, NEED_T, P, _>(token, ray, t_max, OneRay(self, ray))
     }
 
     #[inline(always)]
@@ -189,7 +178,7 @@ pub struct PrimitiveLeaf {
 impl PrimitiveLeaf {
     /// The most primitives a leaf holds. A bound of the builder's: more in a leaf is slow, and more than compact nodes
     /// can tell of.
-    pub const MAX_PRIMITIVES: usize = 4;
+    pub const MAX_PRIMITIVES: usize = MAX_RUN;
 
     /// A leaf of `count` primitives, whose numbers begin at `first` in the hierarchy's list.
     pub const fn new(first: u32, count: u32) -> Self {

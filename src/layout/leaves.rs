@@ -64,10 +64,7 @@ pub trait Leaves: Sized {
     /// What is read first of the leaf at a place, to be fetched.
     #[doc(hidden)]
     fn address<S: Storage>(store: &Self::Store<S>, primitives: &[u32], place: usize) -> *const u8;
-    /// Whether what is read first of a leaf says where to read on.
-    #[doc(hidden)]
-    const LEADS_ON: bool = false;
-    /// Has fetched what is read next, if it does.
+    /// Has fetched what is read of a leaf next, if what is read first says where that is.
     ///
     /// # Safety
     /// The layout's check saw that the leaf is there.
@@ -198,6 +195,30 @@ pub trait Triangles: Copy {
         self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max)
     }
 }
+
+/// What of [`Triangles`] is the same for all but in the number of lanes: `$vector`, of `$lanes`.
+macro_rules! in_lanes {
+    ($vector:ident, $lanes:literal) => {
+        type Lanes<S: $crate::simd::Simd> = S::$vector;
+
+        #[inline(always)]
+        fn finish<
+            S: $crate::simd::Simd,
+            P: $crate::primitive::triangle::Precision,
+            const NEED_T: bool,
+        >(
+            self,
+            token: S,
+            ray: &RayShear,
+            look: Look<S::$vector>,
+            t_max: f32,
+        ) -> Option<$crate::primitive::triangle::TriangleHits<S::$vector>> {
+            let pairs = $crate::layout::leaves::OneRay(self, ray);
+            look.finish::<$lanes, NEED_T, P, _>(token, ray, t_max, pairs)
+        }
+    };
+}
+pub(super) use in_lanes;
 
 /// A ray against all triangles of a leaf.
 #[derive(Clone, Copy)]

@@ -1,17 +1,15 @@
 //! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
 
 use super::{
-    Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode, leaves::OneRay,
+    Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode, leaves::in_lanes,
 };
 use crate::{
     geometry::TriangleMesh,
-    primitive::triangle::{Exact, Look, Precision, RayShear, TriangleHits},
-    simd::{Lanes, RUN_FIRST_BITS, Simd, packed_run},
+    primitive::triangle::{Exact, Look, RayShear, Sheared},
+    simd::{MAX_RUN, RUN_FIRST_BITS, Simd, packed_run},
 };
 use core::{error::Error, fmt, ops::Range};
 
-/// The most primitives of a run.
-pub(crate) const MAX_RUN: usize = 4;
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 
@@ -19,7 +17,7 @@ const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 #[inline(always)]
 pub(crate) const fn of_place(place: usize) -> Range<usize> {
     let first = place & FIRST as usize;
-    first..first + (place >> RUN_FIRST_BITS & 3) + 1
+    first..first + (place >> RUN_FIRST_BITS & (MAX_RUN - 1)) + 1
 }
 
 /// Leaves of up to 4 primitives, which are read from an `M`.
@@ -44,17 +42,13 @@ pub struct Run<'a, M> {
 /// What leaves' primitives are read from.
 #[doc(hidden)]
 pub trait Numbered {
-    /// Whether a number is where something is to be read.
-    const READ: bool;
     /// How many there are, if that is known.
     fn count(&self) -> Option<usize>;
-    /// Has it fetched, if so.
+    /// Has one fetched, if it is to be read here.
     fn fetch<T: Simd>(&self, token: T, number: u32);
 }
 
 impl Numbered for () {
-    const READ: bool = false;
-
     fn count(&self) -> Option<usize> {
         None
     }
@@ -63,8 +57,6 @@ impl Numbered for () {
 }
 
 impl Numbered for TriangleMesh<'_> {
-    const READ: bool = true;
-
     fn count(&self) -> Option<usize> {
         Some(self.len())
     }
@@ -135,8 +127,6 @@ impl<M: Copy + Numbered> Leaves for Runs<M> {
         primitives.as_ptr().wrapping_add(first).cast()
     }
 
-    const LEADS_ON: bool = M::READ;
-
     #[inline(always)]
     unsafe fn fetch_next<T: Simd, S: Storage>(token: T, of: &M, primitives: &[u32], place: usize) {
         for place in of_place(place) {
@@ -168,7 +158,7 @@ impl Listed for Run<'_, ()> {
 
 impl Triangles for Run<'_, TriangleMesh<'_>> {
     type Precision = Exact;
-    type Lanes<S: Simd> = S::F32x4;
+    in_lanes!(F32x4, 4);
 
     #[inline(always)]
     fn first(self) -> usize {
@@ -182,62 +172,76 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
 
     #[inline(always)]
     fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<S::F32x4> {
-        let (indices, positions) = (self.of.indices(), self.of.positions());
-        let Range { start, end } = self.range();
-        let mut triangles = [&[0; 3]; MAX_RUN];
-        for (lane, triangle) in triangles.iter_mut().enumerate() {
-            // SAFETY: the layout's check saw that the run is within the list, and, as `over` has, that every number of the
-            // list is within the mesh.
-            *triangle = unsafe {
-                let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
-                indices.get_unchecked(number as usize)
-            };
-        }
-        // No closure: it would not inherit the target's features.
-        let nowhere = [S::F32x4::splat(token, 0.0); 3];
-        let mut corners = [nowhere; 3];
-        for corner in 0..3 {
-            let mut vertices = [&[0.0; 3]; MAX_RUN];
-            for (vertex, triangle) in vertices.iter_mut().zip(triangles) {
-                // SAFETY: a mesh's indices are within its positions.
-                *vertex = unsafe { positions.get_unchecked(triangle[corner] as usize) };
-            }
-            corners[corner] = token.coordinates(vertices);
-        }
-        let [a, b, c] = corners;
-        let corners = [
-            ray.shear(token, a),
-            ray.shear(token, b),
-            ray.shear(token, c),
+        let triangles = [
+            self.vertices(0),
+            self.vertices(1),
+            self.vertices(2),
+            self.vertices(3),
         ];
+        // SAFETY: triangles of the mesh.
+        let corners = unsafe {
+            [
+                self.shear(token, ray, triangles, 0),
+                self.shear(token, ray, triangles, 1),
+                self.shear(token, ray, triangles, 2),
+            ]
+        };
         Look::new(token, corners, self.lanes())
     }
 
     #[inline(always)]
-    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
-        self,
-        token: S,
-        ray: &RayShear,
-        look: Look<S::F32x4>,
-        t_max: f32,
-    ) -> Option<TriangleHits<S::F32x4>> {
-        look.finish::<4, NEED_T, P, _>(token, ray, t_max, OneRay(self, ray))
-    }
-
-    #[inline(always)]
     fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
-        let (indices, positions) = (self.of.indices(), self.of.positions());
+        // SAFETY: vertices of a triangle of the mesh.
+        self.vertices(lane)
+            .map(|vertex| unsafe { *self.position(vertex) })
+    }
+}
+
+impl<'a> Run<'a, TriangleMesh<'a>> {
+    /// The vertices of the triangle in a lane; past the last, its.
+    #[inline(always)]
+    fn vertices(&self, lane: usize) -> &'a [u32; 3] {
         let Range { start, end } = self.range();
-        // SAFETY: as above.
+        // SAFETY: the layout's check saw that the run is within the list, and, as `over` has, that every number of the
+        // list is within the mesh.
         unsafe {
             let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
-            let [a, b, c] = *indices.get_unchecked(number as usize);
-            [
-                *positions.get_unchecked(a as usize),
-                *positions.get_unchecked(b as usize),
-                *positions.get_unchecked(c as usize),
-            ]
+            self.of.indices().get_unchecked(number as usize)
         }
+    }
+
+    /// Where a vertex is.
+    ///
+    /// # Safety
+    /// It is one of a triangle of the mesh.
+    #[inline(always)]
+    unsafe fn position(&self, vertex: u32) -> &'a [f32; 3] {
+        // SAFETY: the caller's promise: a mesh's indices are within its positions.
+        unsafe { self.of.positions().get_unchecked(vertex as usize) }
+    }
+
+    /// The same corner of all triangles as the ray sees it.
+    ///
+    /// # Safety
+    /// The triangles are the mesh's.
+    #[inline(always)]
+    unsafe fn shear<S: Simd>(
+        &self,
+        token: S,
+        ray: &RayShear,
+        [a, b, c, d]: [&[u32; 3]; MAX_RUN],
+        corner: usize,
+    ) -> Sheared<S::F32x4> {
+        // SAFETY: the caller's promise.
+        let points = unsafe {
+            [
+                self.position(a[corner]),
+                self.position(b[corner]),
+                self.position(c[corner]),
+                self.position(d[corner]),
+            ]
+        };
+        ray.shear(token, token.coordinates(points))
     }
 }
 

@@ -1,6 +1,9 @@
 //! The backend of x86-64 processors with AVX2, FMA and BMI: Haswell (2013), Zen (2017) and later.
 
-use super::{Lanes, Simd, Vector, vector::RUN_FIRST_BITS};
+use super::{
+    Lanes, Simd, Vector,
+    vector::{MAX_RUN, RUN_FIRST_BITS},
+};
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
@@ -284,8 +287,10 @@ fn links4(ends: &[u8; 4], base: u32, stride: u32, first: u32) -> __m128 {
     let first = _mm_add_epi32(_mm_set1_epi32(first as i32), starts);
     let first = _mm_and_si128(first, _mm_set1_epi32((1 << RUN_FIRST_BITS) - 1));
     let counts = _mm_sub_epi32(_mm_sub_epi32(ends, starts), _mm_set1_epi32(1));
-    let counts =
-        _mm_slli_epi32::<{ RUN_FIRST_BITS as i32 }>(_mm_and_si128(counts, _mm_set1_epi32(3)));
+    let counts = _mm_slli_epi32::<{ RUN_FIRST_BITS as i32 }>(_mm_and_si128(
+        counts,
+        _mm_set1_epi32(MAX_RUN as i32 - 1),
+    ));
     let leaves = _mm_or_si128(_mm_or_si128(first, counts), _mm_set1_epi32(i32::MIN));
     let is_node = _mm_cmpeq_epi32(ends, _mm_setzero_si128());
     _mm_castsi128_ps(_mm_blendv_epi8(leaves, nodes, is_node))
@@ -305,7 +310,7 @@ fn links8(ends: &[u8; 8], base: u32, stride: u32, first: u32) -> __m256 {
     let counts = _mm256_sub_epi32(_mm256_sub_epi32(ends, starts), _mm256_set1_epi32(1));
     let counts = _mm256_slli_epi32::<{ RUN_FIRST_BITS as i32 }>(_mm256_and_si256(
         counts,
-        _mm256_set1_epi32(3),
+        _mm256_set1_epi32(MAX_RUN as i32 - 1),
     ));
     let leaves = _mm256_or_si256(_mm256_or_si256(first, counts), _mm256_set1_epi32(i32::MIN));
     let is_node = _mm256_cmpeq_epi32(ends, _mm256_setzero_si256());

@@ -24,4 +24,6 @@ pub use backend::Backend;
 pub(crate) use backend::Operation;
 pub(crate) use one::F32x1;
 pub(crate) use portable::Portable;
-pub(crate) use vector::{Lanes, RUN_FIRST_BITS, Simd, Vector, load_all, packed_run, splat3};
+pub(crate) use vector::{
+    Lanes, MAX_RUN, RUN_FIRST_BITS, Simd, Vector, load_all, packed_run, splat3,
+};

@@ -159,11 +159,14 @@ pub trait Vector<const N: usize>:
 
 /// How many bits of a run say where it begins; those above say how long it is, less 1.
 pub(crate) const RUN_FIRST_BITS: u32 = 29;
+/// The longest run.
+pub(crate) const MAX_RUN: usize = 1 << (31 - RUN_FIRST_BITS);
 
-/// A run of `count` things, 1 to 4, from number `first` on, in 31 bits.
+/// A run of `count` things, 1 to [`MAX_RUN`], from number `first` on, in 31 bits.
 #[inline(always)]
 pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
-    first & ((1 << RUN_FIRST_BITS) - 1) | (count.wrapping_sub(1) & 3) << RUN_FIRST_BITS
+    first & ((1 << RUN_FIRST_BITS) - 1)
+        | (count.wrapping_sub(1) & (MAX_RUN as u32 - 1)) << RUN_FIRST_BITS
 }
 
 /// Eight vectors.

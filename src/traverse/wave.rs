@@ -110,7 +110,7 @@ pub(super) fn trace<
             at_leaf.push_if(&mut leaves, lane, !end);
             at_end.push_if(&mut ends, lane, end);
         }
-        if L::LEADS_ON && is_large {
+        if is_large {
             for place in 0..leaves {
                 let leaf = in_list(lanes, at_leaf.get(place)).current.leaf();
                 // SAFETY: the layout's check saw that all leaves led to are there.
