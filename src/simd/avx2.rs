@@ -24,6 +24,8 @@ impl Simd for Avx2 {
     type F32x4 = F32x4;
     type F32x8 = F32x8;
 
+    const INTERLEAVES: bool = true;
+
     #[inline(always)]
     fn transpose(self, rows: [F32x8; 8]) -> [F32x8; 8] {
         // SAFETY: the token says that the instructions are there.

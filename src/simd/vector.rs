@@ -17,6 +17,9 @@ pub trait Simd: Copy {
     /// Whether triangles are tested one by one, since the target has no vectors: faster there, and less code.
     const ONE_BY_ONE: bool = false;
 
+    /// Whether rays that go their own ways are faster interleaved than one after the other.
+    const INTERLEAVES: bool;
+
     /// Eight rows of eight as columns.
     #[inline(always)]
     fn transpose(self, rows: [Self::F32x8; 8]) -> [Self::F32x8; 8] {

@@ -50,7 +50,8 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// `rays` and answers are not as many, the rest of the longer one is left alone.
 ///
 /// Rays next to each other that start and go alike, such as the camera's by tiles, or shadow rays towards a light, go through
-/// the tree side by side; others are interleaved. Nobody need say which are which.
+/// the tree side by side; others are interleaved, where the [backend](crate::simd::Backend) is faster so (AVX2 and AVX-512), and
+/// else traced one after the other. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// The [closest hit](Self::closest_hit) of each ray. Takes 110 KiB of stack, where this crate is optimised.
     ///
@@ -85,7 +86,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     }
 
     /// As [`closest_hits`](Self::closest_hits), in the caller's memory and with hardly more stack than one ray
-    /// takes. All rays are interleaved, `LANES` at a time.
+    /// takes. All rays are interleaved, `LANES` at a time, or else all are traced one after the other.
     pub fn closest_hits_in<const LANES: usize>(
         &self,
         scratch: &mut Scratch<LANES>,
@@ -208,8 +209,32 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            let mut feed = Feed::<N, L, S, Q>::new(bvh, rays, answers, &waiting, self.one);
-            wave::trace(token, bvh, &mut feed, &mut lanes);
+            trace_rest::<T, N, L, S, Q, LANES>(
+                token, bvh, rays, answers, &waiting, self.one, &mut lanes,
+            );
+        }
+    }
+}
+
+/// Traces the rays that `waiting` has bits for: in waves, if they are of use.
+#[inline(always)]
+fn trace_rest<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize>(
+    token: T,
+    bvh: &Bvh<N, L, S>,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+    waiting: &[u64; feed::GROUPS],
+    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
+    lanes: &mut [MaybeUninit<Lane>; LANES],
+) {
+    if T::INTERLEAVES {
+        let mut feed = Feed::<N, L, S, Q>::new(bvh, rays, answers, waiting, one);
+        wave::trace(token, bvh, &mut feed, lanes);
+        return;
+    }
+    for (index, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+        if waiting[index / bundle::RAYS] >> (index % bundle::RAYS) & 1 != 0 {
+            *answer = one(bvh, ray);
         }
     }
 }
@@ -233,8 +258,10 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> O
         let (rays, answers) = paired(self.rays, self.answers);
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
             let all = [u64::MAX; feed::GROUPS];
-            let mut feed = Feed::<N, L, S, Q>::new(self.bvh, rays, answers, &all, self.one);
-            wave::trace(token, self.bvh, &mut feed, &mut self.scratch.0);
+            let lanes = &mut self.scratch.0;
+            trace_rest::<T, N, L, S, Q, LANES>(
+                token, self.bvh, rays, answers, &all, self.one, lanes,
+            );
         }
     }
 }
