@@ -1,12 +1,13 @@
 //! Many rays of about one origin and one direction against boxes, all at once.
 //!
-//! The planes that a ray meets first are at p·r - o·r. With a point c near all origins that is (p - c)·r - (o - c)·r: the
-//! first term is least at an end of the range that r has over the rays, the second is nearly the same for all. The sum of
-//! the least of each is where the first of the rays may meet the plane, rounding seen to as in the [parent](super):
-//! from (2) there, 7u·D·|r| and 1u·D·|r| for the reciprocal; 2u·D·|r| for p - c and its product; 4u·D·|r| for o - c, at most
-//! 2·D, and its product; 2u·D·|r| and u·E each for the sum with E and the last one: 18u·D·|r| + 3u·E, D being that of all the
-//! rays together. **K_BUNDLE = 24** leaves 6, and (3) needs 2 where reciprocals were cut off. That the least product is at
-//! an end holds after rounding, for rounding is monotone.
+//! The planes that a ray meets first are at p·r - o·r. With a point c this is (p - c)·r - (o - c)·r: the first term is least
+//! at an end of the range that r has over the rays; if c is near all origins, or where all rays pass, the second is nearly
+//! the same for all. The sum of the least of each is where the first of the rays may meet the plane, rounding seen to as in
+//! the [parent](super): from (2) there, 7u·D·|r| and 1u·D·|r| for the reciprocal; 2u·|r| times |p - c| for that and its
+//! product, and times |o - c|, which come to 3·D at most together if c is one of the origins or within the bounds, so 6u·D·|r|;
+//! 2u·D·|r| and u·E each for the sum with E and the last one: 18u·D·|r| + 3u·E, D being that of all the rays together.
+//! **K_BUNDLE = 24** leaves 6, and (3) needs 2 where reciprocals were cut off. That the least product is at an end holds
+//! after rounding, for rounding is monotone.
 //!
 //! Interval arithmetic over a bundle: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005); Wald et al.,
 //! "Ray tracing deformable scenes using dynamic bounding volume hierarchies" (2007).
@@ -42,7 +43,7 @@ pub(crate) struct Bundling<V> {
 }
 
 impl<V: Lanes> Bundling<V> {
-    /// Of no rays so far. `center` is one of their origins, `extent` no less than the D of any.
+    /// Of no rays so far. `center` is one of their origins or within the bounds, `extent` no less than the D of any.
     #[inline(always)]
     pub(crate) fn new<const N: usize>(token: V::Token, center: Vec3, extent: f32) -> Self
     where

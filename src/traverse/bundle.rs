@@ -19,6 +19,7 @@ use crate::{
     slab::{BundleSlabs, Bundling, MAX_EXTENT, PreparedRay, RaySlabs, most, reach, reciprocals},
 };
 use core::mem::MaybeUninit;
+use glam::Vec3;
 
 /// The most rays of a bundle: a bit each.
 pub(super) const RAYS: usize = 64;
@@ -157,6 +158,23 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     }
 }
 
+/// About where rays are closest to one another: at an origin, or, as shadow rays of one light are, at an end within the
+/// bounds.
+#[inline(always)]
+fn crossing(rays: &[Ray], bounds: &Aabb) -> Vec3 {
+    let (Some(first), Some(last)) = (rays.first(), rays.last()) else {
+        return Vec3::ZERO;
+    };
+    let [end, last_end] = [first, last].map(|ray| ray.origin + ray.direction * ray.t_max);
+    let is_within = end.max(bounds.min).min(bounds.max) == end;
+    let between_origins = first.origin.distance_squared(last.origin);
+    if is_within && end.distance_squared(last_end) < between_origins {
+        end
+    } else {
+        first.origin
+    }
+}
+
 /// How many children of `nodes`, all within `bounds`, a bundle of the rays may pass the boxes of, if there is such a bundle.
 #[inline(always)]
 pub(super) fn count_boxes<T: Simd, N: WideNode>(
@@ -207,7 +225,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
         if !(extent < MAX_EXTENT && spread(0) <= SPREAD && spread(1) <= SPREAD) {
             return None;
         }
-        let mut bundling = Bundling::new(token, first.origin, extent);
+        let mut bundling = Bundling::new(token, crossing(rays, bounds), extent);
         for packet in &packets[..count] {
             // SAFETY: just written.
             let Packet { origin, slabs, .. } = unsafe { packet.assume_init_ref() };
