@@ -1,8 +1,8 @@
 //! The hierarchy: its parts, checked once when they are put together.
 
 use super::{
-    Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, MeshLeaf, Node4, Node8,
-    PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, check,
+    Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, Link, MeshLeaf, Node4,
+    Node8, PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, check,
 };
 use crate::{
     geometry::Aabb,
@@ -126,6 +126,27 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     pub(crate) unsafe fn fetch_next<T: Simd>(&self, token: T, place: usize) {
         // SAFETY: the caller's promise.
         unsafe { L::fetch_next::<T, S>(token, &self.leaves, &self.primitives, place) };
+    }
+
+    /// Has what a link leads to fetched.
+    #[inline(always)]
+    pub(crate) fn prefetch<T: Simd>(&self, token: T, link: Link) {
+        token.prefetch(if link.is_leaf() {
+            self.leaf_address(link.leaf())
+        } else {
+            let nodes = self.nodes().as_ptr();
+            nodes.wrapping_byte_add(link.node_offset()).cast()
+        });
+    }
+
+    /// The node that a link leads to.
+    ///
+    /// # Safety
+    /// It is a link of this hierarchy, to a node.
+    #[inline(always)]
+    pub(crate) unsafe fn node(&self, link: Link) -> &N {
+        // SAFETY: the check of `from_parts` saw that all nodes led to are there, or the builder has emitted them in order.
+        unsafe { &*self.nodes().as_ptr().byte_add(link.node_offset()) }
     }
 
     /// What is read first of the leaf at a place.

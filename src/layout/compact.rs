@@ -10,7 +10,7 @@ use crate::{
     geometry::Aabb,
     layout::run,
     simd::{Lanes, Simd, Vector, packed_run},
-    slab::{BundleSlabs, FirstPlanes, NarrowRay, RaySlabs, pow2},
+    slab::{BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane, pow2},
 };
 use bytemuck::{Pod, Zeroable};
 use core::fmt::Debug;

@@ -4,7 +4,7 @@ use super::{Child, Link};
 use crate::{
     geometry::Aabb,
     simd::{Lanes, Simd},
-    slab::{BundleSlabs, NarrowRay},
+    slab::{BundleSlabs, NarrowRay, Passing, RaySlabs},
 };
 use bytemuck::Pod;
 use glam::Vec3;
@@ -49,6 +49,16 @@ pub trait WideNode: Pod + sealed::Sealed {
         slabs: &BundleSlabs,
         t_max: Self::Lanes<S>,
     ) -> (u32, Self::Lanes<S>);
+    /// As [`test`](Self::test), of the ray in lane `ray` modulo 8 of eight, which is number `ray` in `passing`.
+    #[doc(hidden)]
+    fn test_one_of<S: Simd>(
+        &self,
+        token: S,
+        slabs: &RaySlabs<8, S::F32x8>,
+        t_max: &S::F32x8,
+        ray: usize,
+        passing: &mut Passing<Self::Lanes<S>>,
+    );
     /// The planes of a child's box that rays of this direction meet first, and those they meet last.
     #[doc(hidden)]
     fn child_planes(&self, lane: usize, direction: Vec3) -> [[f32; 3]; 2];
@@ -154,6 +164,21 @@ macro_rules! impl_wide_node {
                 let planes = self.planes::<S::$vector>(token, slabs.first());
                 let (hit, near) = slabs.test(token, planes, t_max);
                 (self.present_bits(hit.bits()), near)
+            }
+
+            #[inline(always)]
+            fn test_one_of<S: Simd>(
+                &self,
+                token: S,
+                slabs: &RaySlabs<8, S::F32x8>,
+                t_max: &S::F32x8,
+                ray: usize,
+                passing: &mut Passing<S::$vector>,
+            ) {
+                let t_max = <S::$vector>::splat(token, lane(t_max, ray));
+                let slabs = slabs.of_lane(token, ray);
+                let (hit, near) = self.test_lanes(token, &slabs, t_max);
+                passing.add(token, ray, hit, near);
             }
 
             #[inline(always)]

@@ -54,10 +54,12 @@ impl Simd for Avx2 {
 
 /// Four floats. Made from an [`Avx2`] token or another vector alone.
 #[derive(Clone, Copy)]
+#[repr(transparent)]
 pub struct F32x4(__m128);
 
 /// Eight floats. Made from an [`Avx2`] token or another vector alone.
 #[derive(Clone, Copy)]
+#[repr(transparent)]
 pub struct F32x8(__m256);
 
 macro_rules! impl_operator {

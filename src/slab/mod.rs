@@ -75,11 +75,13 @@
 
 mod bundle;
 mod narrow;
+mod passing;
 mod prepared;
 
 pub use bundle::BundleSlabs;
 pub(crate) use bundle::{Bundling, most};
 pub use narrow::NarrowRay;
+pub use passing::Passing;
 pub(crate) use prepared::{PreparedRay, pow2, reciprocals, unscaled};
 
 use crate::{
@@ -191,6 +193,24 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         (slabs, extent)
     }
 
+    /// Those of the ray in a lane, in every lane of other vectors.
+    #[inline(always)]
+    pub(crate) fn of_lane<const M: usize, W: Vector<M, Token = V::Token>>(
+        &self,
+        token: V::Token,
+        at: usize,
+    ) -> RaySlabs<M, W> {
+        let spread = |[x, y, z]: &[V; 3]| splat3(token, [lane(x, at), lane(y, at), lane(z, at)]);
+        RaySlabs {
+            reciprocal: spread(&self.reciprocal),
+            near: spread(&self.near),
+            far: spread(&self.far),
+            t_min: W::splat(token, lane(&self.t_min, at)),
+            margin: W::splat(token, lane(&self.margin, at)),
+            first: self.first.map(|first| first / N * M),
+        }
+    }
+
     /// How far the computed `t` of a triangle may be off beside what [`reach`] has of `t` itself.
     #[inline(always)]
     pub(crate) fn margin(&self) -> f32 {
@@ -252,6 +272,14 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
 
     /// Bytes of one side's planes.
     const SIDE: usize = size_of::<[f32; N]>();
+}
+
+/// A lane, modulo `N`, of a vector in memory: all of it would be loaded and stored again, to be read there.
+#[inline(always)]
+pub(crate) fn lane<const N: usize, V: Vector<N>>(vector: &V, at: usize) -> f32 {
+    const { assert!(size_of::<V>() == size_of::<[f32; N]>()) };
+    // SAFETY: every backend's vector is as many floats and nothing else, which the size bears out.
+    unsafe { *core::ptr::from_ref(vector).cast::<f32>().add(at % N) }
 }
 
 /// Up to which `t` boxes are of interest, where hits are up to `t_max`.

@@ -80,7 +80,6 @@ pub(super) fn walk_boxes<
     t_max: f32,
     visitor: &mut V,
 ) {
-    let nodes = bvh.nodes().as_ptr();
     let margin = boxes.margin();
     let mut t_max = reach_of(t_max, margin);
     // Apart, so that the length stays in a register and nothing is cleared.
@@ -91,7 +90,7 @@ pub(super) fn walk_boxes<
         while !current.is_leaf() {
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
-            let node = unsafe { &*nodes.byte_add(current.node_offset()) };
+            let node = unsafe { bvh.node(current) };
             let (mut mask, near) = boxes.test(node, t_max);
             if mask == 0 {
                 match pop(&stack, &mut len, t_max) {
@@ -123,11 +122,7 @@ pub(super) fn walk_boxes<
                     other
                 };
                 let link = farther.link();
-                token.prefetch(if link.is_leaf() {
-                    bvh.leaf_address(link.leaf())
-                } else {
-                    nodes.wrapping_byte_add(link.node_offset()).cast()
-                });
+                bvh.prefetch(token, link);
                 // SAFETY: the layout's check saw that a walk never leaves more than `STACK`
                 // children behind.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
