@@ -52,6 +52,17 @@ const LEFTS: [[f32; MAX_WIDTH]; MAX_WIDTH] = {
     all
 };
 
+/// The same where all roots but one are below the left child.
+const LEFTS_OF_ALL_BUT_ONE: [f32; MAX_WIDTH] = {
+    let mut lefts = [0.0; MAX_WIDTH];
+    let mut lane = 1;
+    while lane < MAX_WIDTH {
+        lefts[lane] = LEFTS[lane][lane];
+        lane += 1;
+    }
+    lefts
+};
+
 /// For each number of lanes those that lanes come from that move up by so many.
 const UP: [[u8; MAX_WIDTH]; MAX_WIDTH] = {
     let mut all = [[0; MAX_WIDTH]; MAX_WIDTH];
@@ -80,6 +91,13 @@ impl<S: Simd> Joined<S> {
     #[inline(always)]
     pub fn new<const W: usize>(token: S, left: &Forest, right: &Forest) -> Self {
         const { assert!(W >= 2 && W <= MAX_WIDTH) };
+        // Most nodes have a child for which one root is as good as any number.
+        if right[0] == right[W - 1] {
+            return Self::with_one_root(token, left, right[0], &LEFTS_OF_ALL_BUT_ONE);
+        }
+        if left[0] == left[W - 1] {
+            return Self::with_one_root(token, right, left[0], &LEFTS[1]);
+        }
         let right = S::F32x8::load(token, right);
         let mut least = S::F32x8::splat(token, f32::INFINITY);
         let mut lefts = S::F32x8::splat(token, 0.0);
@@ -91,6 +109,17 @@ impl<S: Simd> Joined<S> {
             lefts = is_less.select(S::F32x8::load(token, &LEFTS[k]), lefts);
         }
         Self { least, lefts }
+    }
+
+    /// Of a child and one that is one root and costs `one`.
+    #[inline(always)]
+    fn with_one_root(token: S, other: &Forest, one: f32, lefts: &[f32; MAX_WIDTH]) -> Self {
+        let sum = S::F32x8::load(token, other).permute(&UP[1]) + S::F32x8::splat(token, one);
+        let more_than_one = S::F32x8::of_bits(token, 0xfe);
+        Self {
+            least: more_than_one.select(sum, S::F32x8::splat(token, f32::INFINITY)),
+            lefts: more_than_one & S::F32x8::load(token, lefts),
+        }
     }
 
     /// C(n, W) if n is no root itself.

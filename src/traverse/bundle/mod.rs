@@ -32,7 +32,7 @@ pub(super) const RAYS: usize = 64;
 const LANES: usize = 8;
 const PACKETS: usize = RAYS / LANES;
 /// No more rays than this of a packet at a leaf are tested one by one.
-const FEW: u32 = 2;
+const FEW_AT_LEAF: u32 = 2;
 /// No more rays than this at a node are: against all children at once.
 const FEW_AT_NODE: u32 = 12;
 /// How far apart the rays of a bundle may go, across for one along their largest component.
@@ -407,7 +407,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             let found = u32::from((self.found >> (LANES * index)) as u8);
             let (axes, of_packet) = (self.axes, &self.rays[LANES * index..]);
             let packet = self.packet(index);
-            let new = if lanes.count_ones() <= FEW {
+            let new = if lanes.count_ones() <= FEW_AT_LEAF {
                 packet.test_by_ray::<Q>(token, leaf, primitives, lanes, found, of_packet, axes)
             } else {
                 packet.test_leaf::<Q, _>(token, leaf, primitives, lanes, found, of_packet, axes)
