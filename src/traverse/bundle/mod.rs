@@ -35,6 +35,8 @@ const PACKETS: usize = RAYS / LANES;
 const FEW_AT_LEAF: u32 = 2;
 /// No more rays than this at a node are: against all children at once.
 const FEW_AT_NODE: u32 = 12;
+/// The same of a bundle that is one packet: all of it takes hardly more than one of its rays.
+const FEW_OF_A_PACKET: u32 = 3;
 /// How far apart the rays of a bundle may go, across for one along their largest component.
 const SPREAD: f32 = 0.5;
 
@@ -242,6 +244,10 @@ impl<'a, T: Simd> Bundle<'a, T> {
         bvh: &Bvh<N, L, S>,
     ) -> bool {
         let direction = self.rays[0].direction;
+        let few = match self.count {
+            1 => FEW_OF_A_PACKET,
+            _ => FEW_AT_NODE,
+        };
         let given_up_at = TRIED * self.rays.len()..DONE * self.rays.len();
         let mut ways: Ways = [MaybeUninit::uninit(); STACK];
         let mut len = 0;
@@ -252,7 +258,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 // SAFETY: the layout's check saw that all leaves led to are there.
                 let leaf = unsafe { bvh.leaf(current.leaf()) };
                 self.test_leaf::<Q>(token, leaf, bvh.primitives(), rays);
-            } else if rays.count_ones() <= FEW_AT_NODE {
+            } else if rays.count_ones() <= few {
                 self.test_one_by_one::<N, L, S, Q>(token, bvh, current, rays, &mut ways, &mut len);
             } else {
                 self.test_together(token, bvh, current, rays, &mut ways, &mut len);
