@@ -75,7 +75,7 @@
 
 mod bundle;
 mod narrow;
-mod passing;
+pub(crate) mod passing;
 mod prepared;
 
 pub use bundle::BundleSlabs;

@@ -2,7 +2,10 @@
 
 use crate::simd::{Lanes, Vector};
 
-/// What up to [`RAYS`](Self::RAYS) rays, tested one after the other, come to.
+/// The most rays: as many as a lane has bits.
+pub(crate) const RAYS: usize = 32;
+
+/// What rays, no more than [`RAYS`], come to that are tested one after the other.
 #[derive(Clone, Copy)]
 pub struct Passing<V> {
     /// For each child a bit for each ray.
@@ -14,9 +17,6 @@ pub struct Passing<V> {
 }
 
 impl<V: Lanes> Passing<V> {
-    /// As many as a lane has bits.
-    pub(crate) const RAYS: usize = 32;
-
     /// None so far.
     #[inline(always)]
     pub(crate) fn none(token: V::Token) -> Self {
@@ -27,13 +27,13 @@ impl<V: Lanes> Passing<V> {
         }
     }
 
-    /// Adds a ray, numbered modulo [`RAYS`](Self::RAYS): which boxes it passes, a comparison's outcome, and from which `t` on.
+    /// Adds a ray, numbered modulo [`RAYS`]: which boxes it passes, a comparison's outcome, and from which `t` on.
     #[inline(always)]
     pub(crate) fn add<const N: usize>(&mut self, token: V::Token, ray: usize, hit: V, near: V)
     where
         V: Vector<N>,
     {
-        let bit = V::splat(token, f32::from_bits(1 << (ray % Self::RAYS)));
+        let bit = V::splat(token, f32::from_bits(1 << (ray % RAYS)));
         self.rays = self.rays | (hit & bit);
         self.near = hit.select(near.min(self.near), self.near);
         self.children |= hit.bits();

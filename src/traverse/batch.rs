@@ -232,9 +232,14 @@ fn trace_rest<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, con
         wave::trace(token, bvh, &mut feed, lanes);
         return;
     }
-    for (index, (ray, answer)) in rays.iter().zip(answers).enumerate() {
-        if waiting[index / bundle::RAYS] >> (index % bundle::RAYS) & 1 != 0 {
-            *answer = one(bvh, ray);
+    let groups = rays
+        .chunks(bundle::RAYS)
+        .zip(answers.chunks_mut(bundle::RAYS));
+    for ((rays, answers), &waiting) in groups.zip(waiting) {
+        for place in classes::places(waiting) {
+            if let (Some(ray), Some(answer)) = (rays.get(place), answers.get_mut(place)) {
+                *answer = one(bvh, ray);
+            }
         }
     }
 }

@@ -16,8 +16,8 @@
 //! them, too, by `opt-level = 3` under `[profile.dev.package.wide-bvh]`.
 
 // Each is written once for every node, leaf and backend. `single` is the walk of one ray; `wave` interleaves many, that
-// `feed` gives it; a `bundle` goes side by side. `batch` chooses between the last two, by the `classes` of the rays. What a
-// leaf's triangles answer is the same code in all of them, so the answers are the same bits.
+// `feed` gives it; a `bundle` goes side by side. `batch` chooses between them, by the `classes` of the rays and by
+// the backend. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
 
 mod batch;
 mod boxes;

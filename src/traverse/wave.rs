@@ -195,7 +195,7 @@ impl Lane {
     ) {
         let nodes = bvh.nodes().as_ptr();
         // SAFETY: the layout's check saw that all nodes led to are there.
-        let node = unsafe { &*nodes.byte_add(self.current.node_offset()) };
+        let node = unsafe { bvh.node(self.current) };
         let slabs = N::widen(token, &self.narrow);
         let far = N::Lanes::<T>::splat(token, self.far);
         let (hit, near) = node.test_lanes(token, &slabs, far);

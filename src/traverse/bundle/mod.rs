@@ -21,7 +21,7 @@ use crate::{
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::bits,
     simd::{Lanes, Simd, Vector, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, most, reach},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, most, passing, reach},
 };
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -314,16 +314,14 @@ impl<'a, T: Simd> Bundle<'a, T> {
             // SAFETY: `hit` has bits for the node's lanes alone, `near` is of as many. The layout's check saw that a walk leaves
             // less than `STACK` children behind, so there is room for the one that it goes on to.
             unsafe {
-                let link = node.link(lane);
-                bvh.prefetch(token, link);
                 let entry = Entry {
-                    link,
+                    link: node.link(lane),
                     near: *near.as_ref().get_unchecked(lane),
                     parent: current,
                     lane: lane as u32,
                     rays,
                 };
-                insert(ways, base, len, entry);
+                insert(token, bvh, ways, base, len, entry);
             }
         }
     }
@@ -342,8 +340,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { bvh.node(current) };
         let mut halves = [Passing::<N::Lanes<T>>::none(token); 2];
+        const { assert!(RAYS == 2 * passing::RAYS) };
         for (half, passing) in halves.iter_mut().enumerate() {
-            let first = half * RAYS / 2;
+            let first = half * passing::RAYS;
             for ray in bits((rays >> first) as u32) {
                 let packet = self.packet((first + ray) / LANES);
                 node.test_one_of(token, &packet.slabs, &packet.far, ray, passing);
@@ -365,16 +364,14 @@ impl<'a, T: Simd> Bundle<'a, T> {
             let [low, high] = [low.as_ref()[lane], high.as_ref()[lane]].map(f32::to_bits);
             // SAFETY: `children` has bits for the node's lanes alone. As above, there is room.
             unsafe {
-                let link = node.link(lane);
-                bvh.prefetch(token, link);
                 let entry = Entry {
-                    link,
+                    link: node.link(lane),
                     near,
                     parent: current,
                     lane: Entry::TESTED,
                     rays: u64::from(high) << 32 | u64::from(low),
                 };
-                insert(ways, base, len, entry);
+                insert(token, bvh, ways, base, len, entry);
             }
         }
     }

@@ -1,6 +1,9 @@
 //! Where rays of a bundle are still to go.
 
-use crate::layout::{Link, STACK};
+use crate::{
+    layout::{Bvh, Leaves, Link, STACK, Storage, WideNode},
+    simd::Simd,
+};
 use core::mem::MaybeUninit;
 
 /// A child to go to, for some of the rays.
@@ -25,11 +28,20 @@ impl Entry {
 pub(super) type Ways = [MaybeUninit<Entry>; STACK];
 
 /// Puts an entry where it belongs among those from `base` on, of which the nearest is the last; of equals, it comes last.
+/// Has what it leads to fetched.
 ///
 /// # Safety
 /// Those below `len` were written, `base` is no more than that, and there is room for another.
 #[inline(always)]
-pub(super) unsafe fn insert(ways: &mut Ways, base: usize, len: &mut usize, entry: Entry) {
+pub(super) unsafe fn insert<T: Simd, N: WideNode, L: Leaves, S: Storage>(
+    token: T,
+    bvh: &Bvh<N, L, S>,
+    ways: &mut Ways,
+    base: usize,
+    len: &mut usize,
+    entry: Entry,
+) {
+    bvh.prefetch(token, entry.link);
     let mut place = *len;
     // SAFETY: the caller's promise: `place` is from `base` to the length.
     unsafe {
