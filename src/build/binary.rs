@@ -93,11 +93,8 @@ impl BinaryTree {
                 }
             }
         }
-        if let Some(node) = led_to.iter().position(|led_to| !led_to) {
-            return Err(TreeError::Unreached { node });
-        }
-
-        // Every node has one parent. So what the root does not lead to runs in circles.
+        // Every node has one parent at most and the root has none, so this ends. What it does not come to
+        // has no parent or runs in circles.
         let mut reached = vec![false; nodes.len()];
         let mut todo = Vec::from_iter((!nodes.is_empty()).then_some(0));
         while let Some(index) = todo.pop() {
@@ -248,6 +245,9 @@ mod tests {
         // A circle beside the tree.
         let circle = [(0, 1), (3, 0), (1, 1), (1, 0), (2, 1)];
         assert_eq!(error(&circle), TreeError::Unreached { node: 1 });
+        // And beyond it a node that has no parent: the circle is first.
+        let circle_first = [&circle[..], &[(3, 1)]].concat();
+        assert_eq!(error(&circle_first), TreeError::Unreached { node: 1 });
         assert_eq!(
             error(&circle).to_string(),
             "node 1: the root does not lead to it"
