@@ -91,6 +91,12 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
 impl<R: Triangles> Triangles for ApproximateRef<R> {
     type Precision = InFloats;
     type Lanes<S: Simd> = R::Lanes<S>;
+    type Four = ApproximateRef<R::Four>;
+
+    #[inline(always)]
+    fn four(self, number: usize) -> Option<Self::Four> {
+        self.0.four(number).map(ApproximateRef)
+    }
 
     #[inline(always)]
     fn first(self) -> usize {

@@ -6,7 +6,7 @@ use super::{
     leaves::in_lanes,
 };
 use crate::{
-    primitive::triangle::{Exact, Look, RayShear},
+    primitive::triangle::{Exact, Look, RayShear, Sheared},
     simd::{MAX_RUN, Simd},
 };
 use bytemuck::{Pod, Zeroable};
@@ -103,14 +103,20 @@ impl TriangleLeaf {
     }
 }
 
-impl Triangles for &TriangleLeaf {
+impl<'a> Triangles for &'a TriangleLeaf {
     type Precision = Exact;
+    type Four = FourOfLeaf<'a>;
     in_lanes!(F32x8, 8);
 
     #[inline(always)]
-    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
+    fn four(self, number: usize) -> Option<FourOfLeaf<'a>> {
+        (4 * number < self.count()).then_some(FourOfLeaf { leaf: self, number })
+    }
+
+    #[inline(always)]
+    fn shared<'b>(self) -> Option<&'b TriangleLeaf>
     where
-        Self: 'a,
+        Self: 'b,
     {
         Some(self)
     }
@@ -145,6 +151,53 @@ impl Triangles for &TriangleLeaf {
                 corners[lane % TriangleLeaf::MAX_TRIANGLES] as usize % TriangleLeaf::MAX_VERTICES;
             [x[vertex], y[vertex], z[vertex]]
         })
+    }
+}
+
+/// Four triangles of a leaf, or fewer.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub struct FourOfLeaf<'a> {
+    leaf: &'a TriangleLeaf,
+    /// 0 or 1: which four.
+    number: usize,
+}
+
+impl Triangles for FourOfLeaf<'_> {
+    type Precision = Exact;
+    type Four = Self;
+    in_lanes!(F32x4, 4);
+
+    #[inline(always)]
+    fn four(self, number: usize) -> Option<Self> {
+        (number == 0).then_some(self)
+    }
+
+    #[inline(always)]
+    fn first(self) -> usize {
+        self.leaf.first() + 4 * self.number
+    }
+
+    #[inline(always)]
+    fn count(self) -> usize {
+        (self.leaf.count() - 4 * self.number).min(4)
+    }
+
+    #[inline(always)]
+    fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<S::F32x4> {
+        let vertices: Sheared<S::F32x8> = ray.shear_arrays(token, &self.leaf.vertices);
+        let [a, b, c]: &[[[u8; 4]; 2]; 3] = bytemuck::cast_ref(&self.leaf.corners);
+        let corners = [
+            vertices.pick(token, &a[self.number % 2]),
+            vertices.pick(token, &b[self.number % 2]),
+            vertices.pick(token, &c[self.number % 2]),
+        ];
+        Look::new(token, corners, self.lanes())
+    }
+
+    #[inline(always)]
+    fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
+        self.leaf.triangle(4 * self.number + lane)
     }
 }
 

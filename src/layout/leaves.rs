@@ -135,7 +135,11 @@ pub trait Triangles: Copy {
     type Precision: Precision;
     /// A number of each, in a backend's vector.
     type Lanes<S: Simd>: Lanes<Token = S>;
+    /// Four of them, or fewer.
+    type Four: Triangles;
 
+    /// The first four, the next four, and so on, if there are any.
+    fn four(self, number: usize) -> Option<Self::Four>;
     /// Where their numbers begin in the hierarchy's list.
     fn first(self) -> usize;
     /// How many there are.
@@ -166,6 +170,26 @@ pub trait Triangles: Copy {
     #[inline(always)]
     fn lanes(self) -> u32 {
         (1 << self.count()) - 1
+    }
+
+    /// All of them, four at a time. No leaf has more than eight.
+    #[inline(always)]
+    fn fours(self) -> impl Iterator<Item = Self::Four> {
+        (0..2).map_while(move |number| self.four(number))
+    }
+
+    /// Whether the ray hits any, up to `t_max`.
+    #[inline(always)]
+    fn is_hit<S: Simd>(self, token: S, ray: &RayShear, t_max: f32) -> bool {
+        if !S::IN_FOURS {
+            return self.test::<S, false>(token, ray, t_max).is_some();
+        }
+        for four in self.fours() {
+            if four.test::<S, false>(token, ray, t_max).is_some() {
+                return true;
+            }
+        }
+        false
     }
 
     /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit.

@@ -17,7 +17,7 @@ use core::ops::{Mul, Sub};
 use super::exact::{Open, Pair, Pairs, exact_hit};
 use crate::{
     geometry::Ray,
-    simd::{F32x1, Portable, Vector, splat3},
+    simd::{F32x1, Portable, Simd, Vector, splat3},
     slab::{CONDITION, PreparedRay, UNIT_ROUNDOFF, pow2},
 };
 
@@ -169,6 +169,16 @@ impl<V> Look<V> {
 }
 
 impl<V> Sheared<V> {
+    /// Four of eight: in lane `i` is the one of lane `lanes[i]`.
+    #[inline(always)]
+    pub(crate) fn pick<S: Simd<F32x8 = V>>(self, token: S, lanes: &[u8; 4]) -> Sheared<S::F32x4> {
+        Sheared {
+            x: token.pick(self.x, lanes),
+            y: token.pick(self.y, lanes),
+            z: token.pick(self.z, lanes),
+        }
+    }
+
     /// Those in other lanes: in lane `i` is the one of lane `lanes[i]`.
     #[inline(always)]
     pub(crate) fn permute<const N: usize>(self, lanes: &[u8; N]) -> Self

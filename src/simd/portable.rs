@@ -23,9 +23,22 @@ impl Simd for Portable {
         all(target_feature = "neon", target_arch = "aarch64")
     ));
 
+    const IN_FOURS: bool = !cfg!(target_feature = "avx");
+
     // Stacks are written lane by lane, which takes what interleaving gains and a sixth more. Miri, which has this backend
     // alone, is to see it nevertheless.
     const INTERLEAVES: bool = cfg!(miri);
+
+    #[inline(always)]
+    fn pick(self, from: f32x8, lanes: &[u8; 4]) -> f32x4 {
+        if HAS_TABLES {
+            let [a, b, c, d] = *lanes;
+            let [picked, _]: [f32x4; 2] = cast(from.permute(&[a, b, c, d, a, b, c, d]));
+            return picked;
+        }
+        let from = from.to_array();
+        f32x4::new(lanes.map(|lane| from[lane as usize % 8]))
+    }
 
     #[inline(always)]
     fn prefetch(self, _: *const u8) {}

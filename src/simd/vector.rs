@@ -17,6 +17,9 @@ pub trait Simd: Copy {
     /// Whether triangles are tested one by one, since the target has no vectors: faster there, and less code.
     const ONE_BY_ONE: bool = false;
 
+    /// Whether eight floats are two vectors of four: then triangles are tested four at a time, for most leaves have no more.
+    const IN_FOURS: bool = false;
+
     /// Whether rays that go their own ways are faster interleaved than one after the other.
     const INTERLEAVES: bool;
 
@@ -30,6 +33,13 @@ pub trait Simd: Copy {
             }
         }
         load_all(self, &columns)
+    }
+
+    /// In lane `i` lane `lanes[i]` modulo 8.
+    #[inline(always)]
+    fn pick(self, from: Self::F32x8, lanes: &[u8; 4]) -> Self::F32x4 {
+        let from = from.to_array();
+        Self::F32x4::load(self, &lanes.map(|lane| from[lane as usize % 8]))
     }
 
     /// Four points' x, y and z.

@@ -12,7 +12,7 @@ use crate::{
     layout::{Bvh, Storage, TriangleLeaves, WideNode},
     simd::{Operation, Simd},
 };
-use core::{fmt, mem::MaybeUninit};
+use core::{fmt, marker::PhantomData, mem::MaybeUninit};
 
 /// Rays under way at a time where the memory is ours to choose.
 const LANES: usize = 32;
@@ -71,7 +71,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             bvh: self,
             rays,
             answers: hits,
-            one: Self::closest_hit,
         });
     }
 
@@ -81,7 +80,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             bvh: self,
             rays,
             answers: occluded,
-            one: Self::any_hit,
         });
     }
 
@@ -98,7 +96,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             rays,
             answers: hits,
             scratch,
-            one: Self::closest_hit,
         });
     }
 
@@ -114,7 +111,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             rays,
             answers: occluded,
             scratch,
-            one: Self::any_hit,
         });
     }
 }
@@ -132,7 +128,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             bvh: self,
             rays,
             active,
-            one: Self::closest_hit,
+            query: PhantomData,
         })
     }
 
@@ -146,7 +142,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
             bvh: self,
             rays,
             active,
-            one: Self::any_hit,
+            query: PhantomData,
         })
     }
 }
@@ -187,8 +183,6 @@ struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
     bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    /// What answers one that is out of the ordinary.
-    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'_, N, L, S, Q> {
@@ -209,9 +203,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            trace_rest::<T, N, L, S, Q, LANES>(
-                token, bvh, rays, answers, &waiting, self.one, &mut lanes,
-            );
+            trace_rest::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
         }
     }
 }
@@ -224,11 +216,10 @@ fn trace_rest<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, con
     rays: &[Ray],
     answers: &mut [Q::Answer],
     waiting: &[u64; feed::GROUPS],
-    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
     lanes: &mut [MaybeUninit<Lane>; LANES],
 ) {
     if T::INTERLEAVES {
-        let mut feed = Feed::<N, L, S, Q>::new(bvh, rays, answers, waiting, one);
+        let mut feed = Feed::<N, L, S, Q>::new(bvh, rays, answers, waiting);
         wave::trace(token, bvh, &mut feed, lanes);
         return;
     }
@@ -238,7 +229,7 @@ fn trace_rest<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, con
     for ((rays, answers), &waiting) in groups.zip(waiting) {
         for place in classes::places(waiting) {
             if let (Some(ray), Some(answer)) = (rays.get(place), answers.get_mut(place)) {
-                *answer = one(bvh, ray);
+                *answer = Q::one(bvh, ray);
             }
         }
     }
@@ -250,7 +241,6 @@ struct Wave<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANE
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     scratch: &'a mut Scratch<LANES>,
-    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> Operation
@@ -264,9 +254,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const LANES: usize> O
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
             let all = [u64::MAX; feed::GROUPS];
             let lanes = &mut self.scratch.0;
-            trace_rest::<T, N, L, S, Q, LANES>(
-                token, self.bvh, rays, answers, &all, self.one, lanes,
-            );
+            trace_rest::<T, N, L, S, Q, LANES>(token, self.bvh, rays, answers, &all, lanes);
         }
     }
 }
@@ -276,7 +264,7 @@ struct Packet<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RA
     bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray; RAYS],
     active: u64,
-    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
+    query: PhantomData<Q>,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Operation
@@ -299,7 +287,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Op
         let outcome = bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, &mut found[..count]);
         if !outcome.is_traced() {
             for (ray, answer) in rays.iter().zip(&mut found) {
-                *answer = (self.one)(self.bvh, ray);
+                *answer = Q::one(self.bvh, ray);
             }
         }
         let mut answers = [Q::MISS; RAYS];

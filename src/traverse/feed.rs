@@ -24,8 +24,6 @@ pub(super) struct Feed<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>
     bvh: &'a Bvh<N, L, S>,
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
-    /// What answers a ray that is out of the ordinary.
-    one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
     /// For each run of 64 rays a bit for each to be traced.
     waiting: &'a [u64; GROUPS],
     /// The run that is made ready now, and those of it that are left.
@@ -46,13 +44,11 @@ impl<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Feed<'a, N, L, S,
         rays: &'a [Ray],
         answers: &'a mut [Q::Answer],
         waiting: &'a [u64; GROUPS],
-        one: fn(&Bvh<N, L, S>, &Ray) -> Q::Answer,
     ) -> Self {
         Self {
             bvh,
             rays,
             answers,
-            one,
             waiting,
             group: 0,
             left: waiting[0],
@@ -139,7 +135,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
             feed.to_start = all & ordinary;
             for place in bits(all & !ordinary) {
                 let index = feed.indices[place];
-                feed.answers[index] = (feed.one)(feed.bvh, &feed.rays[index]);
+                feed.answers[index] = Q::one(feed.bvh, &feed.rays[index]);
             }
         }
     }

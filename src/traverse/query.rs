@@ -1,7 +1,10 @@
 //! What may be asked of a ray.
 
 use super::triangles::Found;
-use crate::geometry::{Hit, Ray};
+use crate::{
+    geometry::{Hit, Ray},
+    layout::{Bvh, Storage, TriangleLeaves, WideNode},
+};
 
 /// The closest hit, or whether there is any.
 pub(super) trait Query {
@@ -9,6 +12,12 @@ pub(super) trait Query {
     const MISS: Self::Answer;
     /// Whether the closest hit is wanted: else the first that is met will do.
     const CLOSEST: bool;
+
+    /// The answer to one ray by itself. A call: in the midst of a batch's code it is slower, on WebAssembly by a fifth.
+    fn one<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        ray: &Ray,
+    ) -> Self::Answer;
 
     /// Of what was found for a ray that was not scaled.
     fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Self::Answer;
@@ -25,6 +34,14 @@ impl Query for ClosestHit {
     const MISS: Option<Hit> = None;
     const CLOSEST: bool = true;
 
+    #[inline(never)]
+    fn one<N: WideNode, L: TriangleLeaves, S: Storage>(
+        bvh: &Bvh<N, L, S>,
+        ray: &Ray,
+    ) -> Option<Hit> {
+        bvh.closest_hit(ray)
+    }
+
     #[inline(always)]
     fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Option<Hit> {
         Some(found.hit(ray, 1.0, primitives))
@@ -35,6 +52,11 @@ impl Query for AnyHit {
     type Answer = bool;
     const MISS: bool = false;
     const CLOSEST: bool = false;
+
+    #[inline(never)]
+    fn one<N: WideNode, L: TriangleLeaves, S: Storage>(bvh: &Bvh<N, L, S>, ray: &Ray) -> bool {
+        bvh.any_hit(ray)
+    }
 
     #[inline(always)]
     fn answer(_: Found, _: &Ray, _: &[u32]) -> bool {

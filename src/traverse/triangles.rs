@@ -268,7 +268,13 @@ impl<L: TriangleLeaves, T: Simd> Visitor<L> for ClosestVisitor<'_, T> {
             t_max,
             found,
         } = self;
-        Found::update(*token, found, t_max, leaf, shear, primitives);
+        if T::IN_FOURS {
+            for four in leaf.fours() {
+                Found::update(*token, found, t_max, four, shear, primitives);
+            }
+        } else {
+            Found::update(*token, found, t_max, leaf, shear, primitives);
+        }
         ControlFlow::Continue(self.t_max)
     }
 }
@@ -297,10 +303,7 @@ impl<L: TriangleLeaves, T: Simd> Visitor<L> for AnyVisitor<'_, T> {
 
     #[inline(always)]
     fn leaf(&mut self, leaf: L::Ref<'_>) -> ControlFlow<(), f32> {
-        if leaf
-            .test::<T, false>(self.token, &self.shear, self.t_max)
-            .is_some()
-        {
+        if leaf.is_hit(self.token, &self.shear, self.t_max) {
             self.found = true;
             return ControlFlow::Break(());
         }

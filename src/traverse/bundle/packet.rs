@@ -201,7 +201,7 @@ impl<T: Simd> Packet<T> {
             let shear = RayShear::of(ray, axes, reciprocals[lane]);
             let mut t_max = t_max[lane];
             if !Q::CLOSEST {
-                let hit = leaf.test::<T, false>(token, &shear, t_max).is_some();
+                let hit = leaf.is_hit(token, &shear, t_max);
                 new |= u32::from(hit) << lane;
                 continue;
             }
