@@ -17,6 +17,8 @@ Usage: bake MESH OUT [OPTIONS]
                        has them [the default]
                        full: nodes of whole floats, leaves that have the triangles: faster, larger; no mesh
                        in the file
+      --reorder        compact with the mesh in the order in which rays read it, its vertices, too, and the numbers in
+                       hits: large meshes are faster, see `Bvh::reorder`
       --without-mesh   compact without the mesh: for who has that in memory already, see `Bvh::over`
   -h, --help           this text
 
@@ -54,19 +56,28 @@ pub enum Width {
 /// Nodes and leaves.
 #[derive(Clone, Copy)]
 pub enum Layout {
-    /// Small nodes; leaves that read the mesh, which is in the file or not.
-    Compact {
-        /// Whether it is in the file.
-        with_mesh: bool,
-    },
+    /// Small nodes; leaves that read the mesh.
+    Compact(MeshInFile),
     /// Nodes of whole floats, leaves that have the triangles.
     Full,
+}
+
+/// What of the mesh is in the file.
+#[derive(Clone, Copy)]
+pub enum MeshInFile {
+    /// Nothing.
+    None,
+    /// All, as it is.
+    AsItIs,
+    /// All, in the order of leaves.
+    Reordered,
 }
 
 /// Reads the program's own arguments.
 pub fn parse() -> Result<Request, lexopt::Error> {
     let (mut mesh, mut out) = (None, None);
-    let (mut width, mut compact, mut with_mesh) = (Width::Eight, true, true);
+    let (mut width, mut compact) = (Width::Eight, true);
+    let (mut without_mesh, mut reorder) = (false, false);
     let mut parser = Parser::from_env();
     while let Some(argument) = parser.next()? {
         match argument {
@@ -77,7 +88,8 @@ pub fn parse() -> Result<Request, lexopt::Error> {
             Arg::Short('l') | Arg::Long("layout") => {
                 compact = parser.value()?.parse_with(is_compact)?;
             }
-            Arg::Long("without-mesh") => with_mesh = false,
+            Arg::Long("reorder") => reorder = true,
+            Arg::Long("without-mesh") => without_mesh = true,
             Arg::Value(path) if mesh.is_none() => mesh = Some(file(path)?),
             Arg::Value(path) if out.is_none() => out = Some(file(path)?),
             other => return Err(other.unexpected()),
@@ -89,14 +101,19 @@ pub fn parse() -> Result<Request, lexopt::Error> {
         // A mesh named there by mistake is not overwritten.
         return Err(format!("{}: a baked file's name ends in .wbvh", out.display()).into());
     }
+    let layout = match (compact, without_mesh, reorder) {
+        (true, false, false) => Layout::Compact(MeshInFile::AsItIs),
+        (true, false, true) => Layout::Compact(MeshInFile::Reordered),
+        (true, true, false) => Layout::Compact(MeshInFile::None),
+        (false, _, false) => Layout::Full,
+        (true, true, true) => return Err("--reorder, --without-mesh: which?".into()),
+        (false, _, true) => return Err("--reorder: of the compact layout alone".into()),
+    };
     Ok(Request::Bake(Args {
         mesh,
         out,
         width,
-        layout: match compact {
-            true => Layout::Compact { with_mesh },
-            false => Layout::Full,
-        },
+        layout,
     }))
 }
 

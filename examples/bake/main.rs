@@ -6,7 +6,7 @@ mod args;
 #[path = "../render/say.rs"]
 mod say;
 
-use args::{Args, Layout, Request, Width};
+use args::{Args, Layout, MeshInFile, Request, Width};
 use indicatif::ProgressBar;
 use say::say;
 use std::{
@@ -16,9 +16,9 @@ use std::{
     time::{Duration, Instant},
 };
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, ReorderedMesh},
     geometry::TriangleMesh,
-    layout::{CompactNode4, CompactNode8, Node4, Node8, WideNode},
+    layout::{Bvh, CompactNode4, CompactNode8, Node4, Node8, Owned, RunLeaf, WideNode},
 };
 use wide_bvh_scenes::{Mesh, load};
 
@@ -45,8 +45,8 @@ fn bake(args: &Args) -> Result<(), Box<dyn Error>> {
     let spinner = ProgressBar::new_spinner().with_message("building");
     spinner.enable_steady_tick(Duration::from_millis(80));
     let baked = match (args.layout, args.width) {
-        (Layout::Compact { with_mesh }, Width::Four) => compact::<CompactNode4>(&mesh, with_mesh),
-        (Layout::Compact { with_mesh }, Width::Eight) => compact::<CompactNode8>(&mesh, with_mesh),
+        (Layout::Compact(in_file), Width::Four) => compact::<CompactNode4>(&mesh, in_file),
+        (Layout::Compact(in_file), Width::Eight) => compact::<CompactNode8>(&mesh, in_file),
         (Layout::Full, Width::Four) => full::<Node4>(&mesh),
         (Layout::Full, Width::Eight) => full::<Node8>(&mesh),
     };
@@ -86,22 +86,29 @@ struct Baked {
     parts: Vec<(&'static str, usize)>,
 }
 
-fn compact<N: WideNode>(mesh: &Mesh, with_mesh: bool) -> Result<Baked, Box<dyn Error>> {
+fn compact<N: WideNode>(mesh: &Mesh, in_file: MeshInFile) -> Result<Baked, Box<dyn Error>> {
     let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
     let start = Instant::now();
-    let tree = builder().build_compact::<N>(&triangles)?;
+    let mut tree = builder().build_compact::<N>(&triangles)?;
     let time = start.elapsed();
     let mut parts = vec![
         ("nodes", size_of_val(tree.nodes())),
         ("leaf data", size_of_val(tree.primitives())),
     ];
-    let bytes = match with_mesh {
-        true => {
-            let (positions, indices) = (&*mesh.positions, &*mesh.indices);
-            parts.push(("mesh", size_of_val(positions) + size_of_val(indices)));
-            tree.over(&triangles)?.to_bytes()?
+    let mut with_mesh = |tree: &Bvh<N, RunLeaf, Owned>, mesh: &TriangleMesh| {
+        let bytes = size_of_val(mesh.positions()) + size_of_val(mesh.indices());
+        parts.push(("mesh", bytes));
+        Ok::<_, Box<dyn Error>>(tree.over(mesh)?.to_bytes()?)
+    };
+    let bytes = match in_file {
+        MeshInFile::None => tree.to_bytes()?,
+        MeshInFile::AsItIs => with_mesh(&tree, &triangles)?,
+        MeshInFile::Reordered => {
+            let ReorderedMesh {
+                positions, indices, ..
+            } = tree.reorder(&triangles)?;
+            with_mesh(&tree, &TriangleMesh::new(&positions, &indices)?)?
         }
-        false => tree.to_bytes()?,
     };
     Ok(Baked {
         bytes,

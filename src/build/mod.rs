@@ -29,7 +29,7 @@
 // 3. `ploc`: the binary tree over leaves, from the bottom up.
 // 4. `leaf_collapse`: as 4 above; then the walk of `emit`.
 //
-// `refit` makes boxes anew when primitives have moved.
+// `refit` makes boxes anew when primitives have moved; `reorder` puts a mesh in the order of leaves.
 //
 // But for the fast one, all binary trees on the way have their nodes in the order of `lay_out`. No step recurses
 // deeper than a bound, whatever the tree. `monitor` is told of all that takes long.
@@ -63,6 +63,7 @@ mod rebalance;
 mod refit;
 mod refs;
 mod reinsertion;
+mod reorder;
 mod report;
 mod runs;
 mod spatial;
@@ -76,4 +77,5 @@ pub use builder::Builder;
 pub use error::{BuildError, RefitError};
 pub use monitor::Monitor;
 pub use preset::Preset;
+pub use reorder::ReorderedMesh;
 pub use report::BuildReport;

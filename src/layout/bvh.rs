@@ -289,6 +289,17 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
     }
 }
 
+#[cfg(feature = "std")]
+impl<N: WideNode> Bvh<N, RunLeaf, crate::layout::Owned> {
+    /// Gives each primitive the number that `numbers` has for the one it had.
+    pub(crate) fn renumber(&mut self, numbers: &[u32]) {
+        for primitive in &mut self.primitives {
+            *primitive = numbers[*primitive as usize];
+        }
+        self.numbers = RunLeaf::numbers(&self.primitives);
+    }
+}
+
 /// What holds the boxes of all nodes as they are tested, if `bounds` hold what is in them.
 #[cfg(feature = "std")]
 pub(crate) fn tested_bounds<N: WideNode>(nodes: &[N], bounds: Aabb) -> Aabb {

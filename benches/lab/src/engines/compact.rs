@@ -6,13 +6,14 @@ use super::{
 };
 use std::{error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, ReorderedMesh},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{Borrowed, Bvh, CompactNode4, CompactNode8, MeshLeaf, Owned, RunLeaf, WideNode},
     simd::Backend,
 };
 
-/// Both widths, on the fastest backend, built by one thread; each called ray by ray, and with all rays at once.
+/// Both widths, on the fastest backend, built by one thread; each called ray by ray, and with all rays at once. The wider one over
+/// a reordered mesh, too.
 ///
 /// # Errors
 /// The mesh cannot be built on.
@@ -20,16 +21,23 @@ pub fn engines<'m>(
     mesh: &TriangleMesh<'m>,
     chosen: Chosen<'_>,
 ) -> Result<Vec<Box<dyn Engine + 'm>>, Box<dyn Error>> {
-    let mut engines = of_width::<CompactNode8>(mesh, chosen)?;
-    engines.extend(of_width::<CompactNode4>(mesh, chosen)?);
+    let mut engines = of_order::<CompactNode8>(mesh, false, chosen)?;
+    engines.extend(of_order::<CompactNode8>(mesh, true, chosen)?);
+    engines.extend(of_order::<CompactNode4>(mesh, false, chosen)?);
     Ok(engines)
 }
 
-fn of_width<'m, N: WideNode + Send + 'm>(
+/// Those over the mesh as it is, or reordered.
+fn of_order<'m, N: WideNode + Send + 'm>(
     mesh: &TriangleMesh<'m>,
+    reorder: bool,
     chosen: Chosen<'_>,
 ) -> Result<Vec<Box<dyn Engine + 'm>>, Box<dyn Error>> {
-    let name = format!("wide-bvh {} compact {}", N::WIDTH, Backend::detect().name());
+    let (width, backend) = (N::WIDTH, Backend::detect().name());
+    let name = match reorder {
+        true => format!("wide-bvh {width} compact reordered {backend}"),
+        false => format!("wide-bvh {width} compact {backend}"),
+    };
     let batch = format!("{name} batch");
     let mut kinds: Vec<(String, Make<'m, N>)> = vec![
         (name, Compact::<N, OneByOne>::boxed),
@@ -39,39 +47,53 @@ fn of_width<'m, N: WideNode + Send + 'm>(
     if kinds.is_empty() {
         return Ok(Vec::new());
     }
-    let (tree, time) = pool(1)?.install(|| timed(|| Builder::new().build_compact::<N>(mesh)));
-    let tree = Rc::new(tree?);
+    let build = || -> Result<_, Box<dyn Error + Send + Sync>> {
+        let mut tree = Builder::new().build_compact::<N>(mesh)?;
+        let reordered = match reorder {
+            true => Some(tree.reorder(mesh)?),
+            false => None,
+        };
+        Ok((tree, reordered))
+    };
+    let (built, time) = pool(1)?.install(|| timed(build));
+    let (tree, reordered) = built.map_err(|error| -> Box<dyn Error> { error })?;
     let bytes = tree.bytes();
+    let tree = Rc::new(Tree {
+        tree,
+        mesh: *mesh,
+        reordered,
+    });
     let built = Built { time, bytes };
-    let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree), *mesh);
+    let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree));
     Ok(kinds.into_iter().map(engine).collect())
 }
 
-/// Makes an engine of the tree and its mesh.
-type Make<'m, N> =
-    fn(String, Built, Rc<Bvh<N, RunLeaf, Owned>>, TriangleMesh<'m>) -> Box<dyn Engine + 'm>;
+/// Makes an engine of a tree.
+type Make<'m, N> = fn(String, Built, Rc<Tree<'m, N>>) -> Box<dyn Engine + 'm>;
 
-/// A tree that both calls share.
+/// A tree, which both calls share.
+struct Tree<'m, N: WideNode> {
+    tree: Bvh<N, RunLeaf, Owned>,
+    /// As it was.
+    mesh: TriangleMesh<'m>,
+    /// As the tree has it, if that is another.
+    reordered: Option<ReorderedMesh>,
+}
+
+/// A tree and how it is called.
 struct Compact<'m, N: WideNode, C> {
     name: String,
     built: Built,
-    tree: Rc<Bvh<N, RunLeaf, Owned>>,
-    mesh: TriangleMesh<'m>,
+    tree: Rc<Tree<'m, N>>,
     call: PhantomData<C>,
 }
 
 impl<'m, N: WideNode + 'm, C: Call + 'm> Compact<'m, N, C> {
-    fn boxed(
-        name: String,
-        built: Built,
-        tree: Rc<Bvh<N, RunLeaf, Owned>>,
-        mesh: TriangleMesh<'m>,
-    ) -> Box<dyn Engine + 'm> {
+    fn boxed(name: String, built: Built, tree: Rc<Tree<'m, N>>) -> Box<dyn Engine + 'm> {
         Box::new(Self {
             name,
             built,
             tree,
-            mesh,
             call: PhantomData,
         })
     }
@@ -86,8 +108,9 @@ impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
         self.built
     }
 
+    /// Of triangles that are hit at one `t` the one of least number is another where numbers are.
     fn is_exact(&self) -> bool {
-        true
+        self.tree.reordered.is_none()
     }
 
     fn takes(&self) -> Takes {
@@ -95,9 +118,21 @@ impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
     }
 
     fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a> {
-        let bvh = self.tree.over(&self.mesh);
+        let Tree {
+            tree,
+            mesh,
+            reordered,
+        } = &*self.tree;
+        let (mesh, numbers) = match reordered {
+            None => (*mesh, None),
+            Some(new) => {
+                let mesh = TriangleMesh::new(&new.positions, &new.indices);
+                (mesh.expect("a mesh"), Some(&*new.triangles))
+            }
+        };
         Box::new(Rays {
-            bvh: bvh.expect("the mesh that it was built on"),
+            bvh: tree.over(&mesh).expect("the mesh that it was built on"),
+            numbers,
             rays,
             call: PhantomData::<C>,
         })
@@ -106,6 +141,8 @@ impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
 
 struct Rays<'a, N: WideNode, C> {
     bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
+    /// The numbers that triangles had, if they have others.
+    numbers: Option<&'a [u32]>,
     rays: &'a [Ray],
     call: PhantomData<C>,
 }
@@ -113,6 +150,11 @@ struct Rays<'a, N: WideNode, C> {
 impl<N: WideNode, C: Call> Batch for Rays<'_, N, C> {
     fn closest(&self, hits: &mut [Option<Hit>]) {
         C::closest(&self.bvh, self.rays, hits);
+        if let Some(numbers) = self.numbers {
+            for hit in hits.iter_mut().flatten() {
+                hit.primitive = numbers[hit.primitive as usize];
+            }
+        }
     }
 
     fn any(&self, occluded: &mut [bool]) {

@@ -1,0 +1,90 @@
+//! A mesh in the order in which rays read it.
+
+use crate::{
+    geometry::TriangleMesh,
+    layout::{Bvh, MeshTooSmall, Owned, RunLeaf, WideNode},
+};
+use std::{vec, vec::Vec};
+
+/// A mesh whose triangles are in the order of a compact hierarchy's leaves, and its vertices in that of their first use:
+/// see [`Bvh::reorder`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReorderedMesh {
+    /// The vertices that triangles use.
+    pub positions: Vec<[f32; 3]>,
+    /// All triangles; those that are in no leaf come last.
+    pub indices: Vec<[u32; 3]>,
+    /// The number that each vertex had: what else is known of vertices goes by it into the new order.
+    pub vertices: Vec<u32>,
+    /// The number that each triangle had.
+    pub triangles: Vec<u32>,
+}
+
+impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
+    /// Puts the mesh that this was built on into the order in which rays read it, and the hierarchy's own numbers with it: from
+    /// then on it is one over the new mesh, as if it had been built on that.
+    ///
+    /// A compact hierarchy's leaves read the mesh where it is. If what is close together in space is far apart there, as
+    /// it is in most files, each triangle is in cache lines of its own.
+    ///
+    /// ```
+    /// # use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}, layout::CompactBvh8};
+    /// # let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+    /// # let indices = [[0, 1, 2_u32]];
+    /// let mesh = TriangleMesh::new(&positions, &indices)?;
+    /// let mut compact: CompactBvh8 = Builder::new().build_compact(&mesh)?;
+    /// let reordered = compact.reorder(&mesh)?;
+    /// let mesh = TriangleMesh::new(&reordered.positions, &reordered.indices)?;
+    /// let hit = compact.over(&mesh)?.closest_hit(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])).unwrap();
+    /// assert_eq!(reordered.triangles[hit.primitive as usize], 0); // as it was called before
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The mesh has no triangle of some number that is in a leaf. The hierarchy is then as it was.
+    pub fn reorder(&mut self, mesh: &TriangleMesh) -> Result<ReorderedMesh, MeshTooSmall> {
+        self.over(mesh)?;
+        let listed = self.primitives().iter().copied();
+        let triangles = Order::of_first_use(mesh.len(), listed.chain(0..mesh.len() as u32));
+        self.renumber(&triangles.places);
+        let corners = |&triangle: &u32| mesh.indices()[triangle as usize];
+        let used = triangles.all.iter().flat_map(corners);
+        let vertices = Order::of_first_use(mesh.positions().len(), used);
+        let position = |&vertex: &u32| mesh.positions()[vertex as usize];
+        let indices = triangles.all.iter().map(corners);
+        Ok(ReorderedMesh {
+            positions: vertices.all.iter().map(position).collect(),
+            indices: indices
+                .map(|corners| corners.map(|vertex| vertices.places[vertex as usize]))
+                .collect(),
+            vertices: vertices.all,
+            triangles: triangles.all,
+        })
+    }
+}
+
+/// Numbers in a new order.
+struct Order {
+    /// In it.
+    all: Vec<u32>,
+    /// Where in it each number is, if it is.
+    places: Vec<u32>,
+}
+
+impl Order {
+    /// Of numbers below `count`, as they are first met.
+    fn of_first_use(count: usize, uses: impl Iterator<Item = u32>) -> Self {
+        let mut order = Self {
+            all: Vec::with_capacity(count),
+            places: vec![u32::MAX; count],
+        };
+        for number in uses {
+            let place = &mut order.places[number as usize];
+            if *place == u32::MAX {
+                *place = order.all.len() as u32;
+                order.all.push(number);
+            }
+        }
+        order
+    }
+}
