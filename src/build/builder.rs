@@ -141,7 +141,8 @@ impl<'m> Builder<'m> {
 
     /// The compact hierarchy over a mesh, which stays where it is and is read there: see
     /// [`over`](Bvh::over). `N` is [`CompactNode8`](crate::layout::CompactNode8) or
-    /// [`CompactNode4`](crate::layout::CompactNode4).
+    /// [`CompactNode4`](crate::layout::CompactNode4). A large mesh is read faster in the order of leaves: see
+    /// [`reorder`](Bvh::reorder).
     ///
     /// ```
     /// use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}, layout::CompactBvh8};
@@ -155,7 +156,7 @@ impl<'m> Builder<'m> {
     /// ```
     ///
     /// # Errors
-    /// As [`build`](Self::build); more than 2^28 - 2 triangles or pieces of them.
+    /// As [`build`](Self::build); more than 2^29 - 2 triangles or pieces of them, 2^28 under 4-wide nodes.
     pub fn build_compact<N: WideNode>(
         &self,
         mesh: &TriangleMesh,
@@ -166,7 +167,7 @@ impl<'m> Builder<'m> {
     /// The compact hierarchy over a caller's primitives, asked as one of [`build_primitives`](Self::build_primitives) is.
     ///
     /// # Errors
-    /// As [`build_primitives`](Self::build_primitives); more than 2^28 - 2 primitives.
+    /// As [`build_primitives`](Self::build_primitives); more than 2^29 - 2 primitives, 2^28 under 4-wide nodes.
     pub fn build_compact_primitives<N: WideNode>(
         &self,
         aabbs: &[Aabb],

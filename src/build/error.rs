@@ -31,7 +31,7 @@ pub enum BuildError {
     },
     /// There are this many primitives, which is more than
     /// [`TriangleMesh::MAX_TRIANGLES`](crate::geometry::TriangleMesh::MAX_TRIANGLES), or a tree that
-    /// lists them this often; or, over a compact hierarchy's limit of 2^28 - 2, numbers in its leaves.
+    /// lists them this often; or, over a compact hierarchy's limit of 2^29 - 2, 2^28 under 4-wide nodes, numbers in its leaves.
     TooManyPrimitives(usize),
     /// No leaf of the tree lists this primitive, which can be hit.
     PrimitiveMissing {

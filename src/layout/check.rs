@@ -153,9 +153,8 @@ pub(super) fn root<N: WideNode, L: Leaves>(
     count: usize,
     primitives: usize,
 ) -> Result<Child, LayoutError> {
-    let most = (1 << 31) - 2;
-    let most_nodes = most / (size_of::<N>() / Link::UNIT);
-    if nodes > most_nodes || count > most || primitives > u32::MAX as usize {
+    let most_nodes = N::PLACES.min(((1 << 31) - 2) / (size_of::<N>() / Link::UNIT));
+    if nodes > most_nodes || count > N::PLACES || primitives > u32::MAX as usize {
         return Err(LayoutError::TooLarge);
     }
     match (nodes, L::only(count)) {
@@ -192,4 +191,29 @@ fn count_children<N: WideNode>(
         }
     }
     Ok(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{CompactNode4, CompactNode8, Node8, RunLeaf, TriangleLeaf};
+
+    /// As many as links tell apart, and one more.
+    #[test]
+    fn too_large() {
+        let ends_at = |most: usize, root: fn(usize) -> Result<Child, LayoutError>| {
+            assert_eq!(root(most), Ok(Child::node(0)));
+            assert_eq!(root(most + 1), Err(LayoutError::TooLarge));
+        };
+        ends_at(1 << 28, |count| {
+            root::<CompactNode4, RunLeaf>(1, count, count)
+        });
+        ends_at((1 << 31) - 2, |count| {
+            root::<CompactNode8, RunLeaf>(1, count, count)
+        });
+        ends_at((1 << 31) - 2, |count| {
+            root::<Node8, TriangleLeaf>(1, count, count)
+        });
+        ends_at(1 << 28, |nodes| root::<CompactNode4, RunLeaf>(nodes, 1, 1));
+    }
 }

@@ -113,6 +113,9 @@ impl Frame {
 
 /// Where a compact node's children are. Leaves have up to 4 primitives.
 pub trait Head: Pod + Debug {
+    /// How many places it tells apart.
+    #[doc(hidden)]
+    const PLACES: usize;
     /// The head, and its byte in the frame, of a node whose child nodes begin at `nodes` and whose primitives begin at
     /// `units`. `counts` are the primitives of each child, none of a node.
     #[doc(hidden)]
@@ -147,6 +150,8 @@ pub struct Head8 {
 }
 
 impl Head for Head8 {
+    const PLACES: usize = (1 << 31) - 2;
+
     fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8) {
         let mut ends = [0; 8];
         let mut end = 0;
@@ -191,7 +196,7 @@ pub struct Head4 {
 }
 
 impl Head4 {
-    const PLACE: u32 = (1 << 28) - 1;
+    const PLACE: u32 = Self::PLACES as u32 - 1;
 
     /// 4 bits a child.
     #[inline(always)]
@@ -201,6 +206,8 @@ impl Head4 {
 }
 
 impl Head for Head4 {
+    const PLACES: usize = 1 << 28;
+
     fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8) {
         let mut all = [15; 4];
         for (own, &count) in all.iter_mut().zip(counts) {
@@ -260,6 +267,7 @@ fn leaf(first: u32, start: u32, end: u32) -> Link {
 
 impl<const W: usize, H: Head> CompactNode<W, H> {
     const ORDERED: bool = true;
+    const PLACES: usize = H::PLACES;
 
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let (mut aabbs, mut counts, mut len) = ([Aabb::EMPTY; W], [0; W], 0);

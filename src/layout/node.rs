@@ -20,6 +20,9 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// first, and to bounds that hold the second.
     #[doc(hidden)]
     const NODES_FIRST: bool;
+    /// How many nodes, or leaves or what is counted of them, its links tell apart.
+    #[doc(hidden)]
+    const PLACES: usize;
     /// The ray in this node's terms, in a backend's vectors.
     #[doc(hidden)]
     type Slabs<S: Simd>: Copy;
@@ -105,7 +108,7 @@ pub(super) mod sealed {
 }
 
 /// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes, `$kind` in headers, that can
-/// - be made of children, say whether only of ordered ones: `new`, `ORDERED`;
+/// - be made of children, say whether only of ordered ones, and of how many in all: `new`, `ORDERED`, `PLACES`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
@@ -127,6 +130,7 @@ macro_rules! impl_wide_node {
             const WIDTH: usize = $width;
             const KIND: u32 = $kind;
             const NODES_FIRST: bool = Self::ORDERED;
+            const PLACES: usize = Self::PLACES;
             type Slabs<S: Simd> = RaySlabs<$width, S::$vector>;
             type Lanes<S: Simd> = S::$vector;
 
