@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 100 to 160 | 0.76 |
-/// | [`Balanced`](Self::Balanced) | 540 to 690 | 0.94 |
-/// | [`Best`](Self::Best) | 1,700 to 2,300 | 1 |
+/// | [`Fast`](Self::Fast) | 110 to 150 | 0.77 |
+/// | [`Balanced`](Self::Balanced) | 580 to 710 | 0.93 |
+/// | [`Best`](Self::Best) | 1,700 to 2,500 | 1 |
 ///
 /// A Zen 4 takes half as long. What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a
 /// triangle there.

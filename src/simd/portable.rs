@@ -23,6 +23,7 @@ impl Simd for Portable {
         all(target_feature = "neon", target_arch = "aarch64")
     ));
 
+    // With AVX `wide` has vectors of eight.
     const IN_FOURS: bool = !cfg!(target_feature = "avx");
 
     // Stacks are written lane by lane, which takes what interleaving gains and a sixth more. Miri, which has this backend
