@@ -49,13 +49,17 @@ use wide_bvh_scenes::Mesh;
 /// Embree 4 none); `coherent`, with the flag that says so. They share one tree. Rays are in an engine's own
 /// format beforehand, in the order of the workload; copying what a call overwrites is timed.
 ///
+/// This crate's: `8` and `4`, the width; `compact`, over the mesh's own buffers; `reordered`, over those in the
+/// order of the leaves; `approximate`, the triangle test in `f32` alone; `batch` and `packet 8`, calls for many
+/// rays. `portable` is what the program was compiled for, others are the processor's.
+///
 /// Builders take turns likewise. Their trees are compared by how fast bounce rays are traced, one a call, by
 /// one thread.
 ///
-/// Answers are compared to brute force on a sample of the rays. Engines of this crate disagree if one
-/// bit of t, u, v or the triangle's number differs. Others disagree if they hit where brute force
-/// misses or the reverse, or hit another triangle at a t that differs by more than 1e-5 of it. For
-/// shadow rays only hit or miss counts.
+/// Answers are compared to brute force on a sample of the rays. Engines of this crate, but approximate and
+/// reordered ones, disagree if one bit of t, u, v or the triangle's number differs. Others disagree if they hit
+/// where brute force misses or the reverse, or hit another triangle at a t that differs by more than 1e-5 of it.
+/// For shadow rays only hit or miss counts.
 ///
 /// Embree is looked for when running, version 4 before 3; without it the rest still race
 /// (Debian and Ubuntu: apt-get install libembree-dev).

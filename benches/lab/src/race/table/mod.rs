@@ -19,8 +19,8 @@ pub fn legend() -> String {
 Figures: million rays a second, the median of the rounds; one thread. In brackets: times {YARDSTICK}.
 Build: by one thread. Bytes a triangle: what is kept besides the vertex and index buffers.
 Wrong: of a sample of the rays ({}), those answered otherwise than by brute force.
-For {OURS}engines one bit of t, u, v or the triangle's number is enough; for others, a hit for a miss
-or the reverse, or another triangle with t off by more than {TOLERANCE:e} of it.
+For {OURS}engines but approximate and reordered ones one bit of t, u, v or the triangle's number is enough; for
+others, a hit for a miss or the reverse, or another triangle with t off by more than {TOLERANCE:e} of it.
 Means: the first is over {YARDSTICK}; the second over whichever of Embree's calls is the fastest at that
 workload in that scene: of those for single rays for an engine that takes one ray a call, of all for batches.
 Embree's robust mode is none of them.
