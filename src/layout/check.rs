@@ -153,7 +153,7 @@ pub(super) fn root<N: WideNode, L: Leaves>(
     count: usize,
     primitives: usize,
 ) -> Result<Child, LayoutError> {
-    let most_nodes = N::PLACES.min(((1 << 31) - 2) / (size_of::<N>() / Link::UNIT));
+    let most_nodes = N::PLACES.min(Link::PLACES / (size_of::<N>() / Link::UNIT));
     if nodes > most_nodes || count > N::PLACES || primitives > u32::MAX as usize {
         return Err(LayoutError::TooLarge);
     }

@@ -71,6 +71,8 @@ impl Link {
     /// 16 bytes.
     pub const UNIT: usize = 1 << Self::SHIFT;
     const SHIFT: u32 = 4;
+    /// How many places 31 bits tell apart, from each other and from no child.
+    pub(crate) const PLACES: usize = (1 << 31) - 2;
 
     /// The link to `child`, nodes being `N`, which is a whole number of units. Of a place too far away for
     /// 31 bits, nothing sensible comes: the layout's check sees it.

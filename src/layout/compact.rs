@@ -150,7 +150,7 @@ pub struct Head8 {
 }
 
 impl Head for Head8 {
-    const PLACES: usize = (1 << 31) - 2;
+    const PLACES: usize = Link::PLACES;
 
     fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8) {
         let mut ends = [0; 8];

@@ -41,7 +41,7 @@ impl_wide_node!(Node8, 2, 8, F32x8, 224);
 
 impl<const W: usize, A> Node<W, A> {
     const ORDERED: bool = false;
-    const PLACES: usize = (1 << 31) - 2;
+    const PLACES: usize = Link::PLACES;
 
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let mut node = Self {

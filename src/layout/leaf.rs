@@ -165,13 +165,7 @@ pub struct FourOfLeaf<'a> {
 
 impl Triangles for FourOfLeaf<'_> {
     type Precision = Exact;
-    type Four = Self;
-    in_lanes!(F32x4, 4);
-
-    #[inline(always)]
-    fn four(self, number: usize) -> Option<Self> {
-        (number == 0).then_some(self)
-    }
+    in_lanes!(four);
 
     #[inline(always)]
     fn first(self) -> usize {

@@ -220,8 +220,18 @@ pub trait Triangles: Copy {
     }
 }
 
-/// What of [`Triangles`] is the same for all but in the number of lanes: `$vector`, of `$lanes`.
+/// What of [`Triangles`] is the same for all but in the number of lanes: `$vector`, of `$lanes`. And what is the same for all
+/// that have no more than four: `in_lanes!(four)`.
 macro_rules! in_lanes {
+    (four) => {
+        type Four = Self;
+        $crate::layout::leaves::in_lanes!(F32x4, 4);
+
+        #[inline(always)]
+        fn four(self, number: usize) -> Option<Self> {
+            (number == 0).then_some(self)
+        }
+    };
     ($vector:ident, $lanes:literal) => {
         type Lanes<S: $crate::simd::Simd> = S::$vector;
 

@@ -158,13 +158,7 @@ impl Listed for Run<'_, ()> {
 
 impl Triangles for Run<'_, TriangleMesh<'_>> {
     type Precision = Exact;
-    type Four = Self;
-    in_lanes!(F32x4, 4);
-
-    #[inline(always)]
-    fn four(self, number: usize) -> Option<Self> {
-        (number == 0).then_some(self)
-    }
+    in_lanes!(four);
 
     #[inline(always)]
     fn first(self) -> usize {

@@ -30,15 +30,12 @@ impl Simd for Portable {
     // alone, is to see it nevertheless.
     const INTERLEAVES: bool = cfg!(miri);
 
+    // Where there are tables.
+    #[cfg(all(target_feature = "neon", target_arch = "aarch64"))]
     #[inline(always)]
-    fn pick(self, from: f32x8, lanes: &[u8; 4]) -> f32x4 {
-        if HAS_TABLES {
-            let [a, b, c, d] = *lanes;
-            let [picked, _]: [f32x4; 2] = cast(from.permute(&[a, b, c, d, a, b, c, d]));
-            return picked;
-        }
-        let from = from.to_array();
-        f32x4::new(lanes.map(|lane| from[lane as usize % 8]))
+    fn pick(self, from: f32x8, &[a, b, c, d]: &[u8; 4]) -> f32x4 {
+        let [picked, _]: [f32x4; 2] = cast(from.permute(&[a, b, c, d, a, b, c, d]));
+        picked
     }
 
     #[inline(always)]

@@ -49,10 +49,7 @@ fn of_order<'m, N: WideNode + Send + 'm>(
     }
     let build = || -> Result<_, Box<dyn Error + Send + Sync>> {
         let mut tree = Builder::new().build_compact::<N>(mesh)?;
-        let reordered = match reorder {
-            true => Some(tree.reorder(mesh)?),
-            false => None,
-        };
+        let reordered = reorder.then(|| tree.reorder(mesh)).transpose()?;
         Ok((tree, reordered))
     };
     let (built, time) = pool(1)?.install(|| timed(build));
