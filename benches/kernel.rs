@@ -122,7 +122,7 @@ fn build(c: &mut Criterion) {
     group.throughput(Throughput::Elements(mesh.len() as u64));
     for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
         group.bench_function(format!("8 wide, {preset:?}"), |b| {
-            b.iter(|| Builder::preset(preset).build(&mesh))
+            b.iter(|| Builder::new().preset(preset).build(&mesh))
         });
     }
     group.bench_function("4 wide", |b| {

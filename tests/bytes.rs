@@ -112,7 +112,7 @@ fn compact_nodes_of_every_preset() {
     let moved = TriangleMesh::new(&moved, &scene.indices).unwrap();
     let full_moved: Bvh8 = Builder::new().build(&moved).unwrap();
     for preset in [Preset::Best, Preset::Balanced, Preset::Fast] {
-        let builder = Builder::preset(preset);
+        let builder = Builder::new().preset(preset);
         of_both_leaves::<CompactNode8>(&builder, &mesh, &scene.rays, &full);
         of_both_leaves::<CompactNode4>(&builder, &mesh, &scene.rays, &full);
     }
@@ -308,7 +308,7 @@ fn opened_and_owned() {
     let mut moved = scene.positions.clone();
     moved.iter_mut().for_each(|[x, ..]| *x += 1.0);
     let moved = TriangleMesh::new(&moved, &scene.indices).unwrap();
-    let builder = Builder::preset(Preset::Balanced);
+    let builder = Builder::new().preset(Preset::Balanced);
     let mut built = builder.build(&scene.mesh()).unwrap();
     let bytes = AlignedBytes::new(&built.to_bytes().unwrap());
     let opened = Bvh::<Node8, TriangleLeaf, Borrowed>::from_bytes(&bytes).unwrap();

@@ -29,7 +29,7 @@ fn mesh() -> Mesh {
 
 fn build<N: WideNode>(mesh: &Mesh) -> Bvh<N, TriangleLeaf, Owned> {
     let mesh = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
-    Builder::preset(Preset::Fast).build_as(&mesh).unwrap()
+    Builder::new().preset(Preset::Fast).build_as(&mesh).unwrap()
 }
 
 /// Rays that are alike, hits and misses; at vertices, from inside, along an axis, of bad numbers, out of proportion.
@@ -231,7 +231,7 @@ fn primitives() {
     fn check<N: WideNode>() {
         let at = |i: usize| glam::Vec3::new(i as f32 * 1.5, (i % 3) as f32, (i % 5) as f32);
         let boxes: Vec<Aabb> = (0..20).map(|i| Aabb::new(at(i), at(i) + 1.0)).collect();
-        let builder = Builder::preset(Preset::Fast);
+        let builder = Builder::new().preset(Preset::Fast);
         let bvh: Bvh<N, PrimitiveLeaf, Owned> = builder.build_primitives(&boxes).unwrap();
         let cuboids = Cuboids(&boxes);
         let mut hits = 0;

@@ -22,8 +22,8 @@ fn builders() -> [Builder<'static>; 4] {
     [
         Builder::new(),
         Builder::new().splits(3.0),
-        Builder::preset(Preset::Balanced),
-        Builder::preset(Preset::Fast),
+        Builder::new().preset(Preset::Balanced),
+        Builder::new().preset(Preset::Fast),
     ]
     .map(|builder| builder.drop_non_finite(true))
 }
@@ -333,7 +333,8 @@ fn boxes() {
     let mut solid = Solid((0..500).map(|_| random(&mut rng)).collect());
     solid.0[3] = Aabb::EMPTY;
     for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
-        let mut bvh = Builder::preset(preset)
+        let mut bvh = Builder::new()
+            .preset(preset)
             .build_primitives::<Node8>(&solid.0)
             .unwrap();
         for share in [1.0, 0.3, 0.0] {

@@ -205,7 +205,7 @@ fn bytes(input: &Input, mesh: &Mesh) -> (Vec<u8>, bool) {
             fast,
         } => {
             let preset = if fast { Preset::Fast } else { Preset::Best };
-            let builder = Builder::preset(preset).drop_non_finite(true);
+            let builder = Builder::new().preset(preset).drop_non_finite(true);
             let leaves = kind_of_leaves(nodes, leaves);
             match nodes % 4 {
                 0 => full::<Node4>(&builder, input, mesh, leaves),

@@ -219,7 +219,7 @@ fn boxes_hold<N: WideNode, L: Leaf>(bvh: &Bvh<N, L, Owned>, inside: impl Fn(&L) 
 
 fn triangles<N: Width>(input: &Input, mesh: &Mesh, fast: bool) {
     let preset = if fast { Preset::Fast } else { Preset::Best };
-    let builder = Builder::preset(preset).drop_non_finite(true);
+    let builder = Builder::new().preset(preset).drop_non_finite(true);
     let start = N::build(&builder, &mesh.view()).expect("a build");
     let most = if mesh.is_large() { 4 } else { 20 };
     let rays = rays(&input.rays, &mesh.corners(), most);
@@ -295,7 +295,7 @@ impl LeafTriangles {
                 .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
                 .collect(),
         };
-        let builder = Builder::preset(Preset::Fast).drop_non_finite(true);
+        let builder = Builder::new().preset(Preset::Fast).drop_non_finite(true);
         let of_all = Node8::build(&builder, &mesh.view()).expect("a build");
         let mut kept = vec![false; all.len()];
         for &triangle in of_all.primitives() {

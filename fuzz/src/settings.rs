@@ -26,7 +26,7 @@ enum Splits {
 impl Settings {
     pub fn builder<'m>(&self) -> Builder<'m> {
         let preset = [Preset::Best, Preset::Balanced, Preset::Fast];
-        let builder = Builder::preset(preset[usize::from(self.preset % 3)]);
+        let builder = Builder::new().preset(preset[usize::from(self.preset % 3)]);
         let builder = builder.drop_non_finite(self.drop_non_finite);
         match self.splits {
             None => builder,

@@ -34,22 +34,14 @@ use crate::{
 /// assert!(bvh.closest_hit(&Ray::new([0.2, 0.2, -1.0], [0.0, 0.0, 1.0])).is_some());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Builder<'m> {
     preset: Preset,
     drop_non_finite: bool,
-    splits: f32,
+    /// If it is not the preset's.
+    splits: Option<f32>,
     monitored: Monitored<'m>,
 }
-
-impl Default for Builder<'_> {
-    fn default() -> Self {
-        Self::preset(Preset::default())
-    }
-}
-
-/// Room enough: game levels and a kitchen use 0.05 to 0.12. With 0.1, a level that uses 0.12 loses half its gain.
-const SPLITS: f32 = 0.3;
 
 impl<'m> Builder<'m> {
     /// A builder of the best hierarchies, which refuses primitives that are not finite.
@@ -57,20 +49,12 @@ impl<'m> Builder<'m> {
         Self::default()
     }
 
-    /// A builder for what the hierarchy is for, which refuses primitives that are not finite.
+    /// What the hierarchy is for: how much time a build may take.
     ///
-    /// [`build_binary`](Self::build_binary), [`build_from_tree`](Self::build_from_tree) and the like do not look at the
-    /// preset.
-    pub fn preset(preset: Preset) -> Self {
-        Self {
-            preset,
-            drop_non_finite: false,
-            splits: match preset {
-                Preset::Best => SPLITS,
-                Preset::Balanced | Preset::Fast => 0.0,
-            },
-            monitored: Monitored::default(),
-        }
+    /// [`build_binary`](Self::build_binary), [`build_from_tree`](Self::build_from_tree) and the like do not look at it.
+    pub fn preset(mut self, preset: Preset) -> Self {
+        self.preset = preset;
+        self
     }
 
     /// Has a monitor told how far builds have got, which may stop them.
@@ -112,9 +96,9 @@ impl<'m> Builder<'m> {
     /// For [`Preset::Best`] it is 0.3, of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
     /// which takes 6 to 15 % more memory, and up to 9 % off the nodes and leaves that a ray meets.
     ///
-    /// Only [`build`](Self::build) and [`build_as`](Self::build_as) cut triangles, and none for [`Preset::Fast`].
+    /// What takes a mesh and no tree cuts triangles, but not for [`Preset::Fast`].
     pub fn splits(mut self, fraction: f32) -> Self {
-        self.splits = fraction;
+        self.splits = Some(fraction);
         self
     }
 
@@ -283,7 +267,7 @@ impl<'m> Builder<'m> {
         let wants = Wants {
             preset: self.preset,
             drop_non_finite: self.drop_non_finite,
-            splits: self.splits,
+            splits: self.splits.unwrap_or(self.preset.splits()),
         };
         pipeline::build(input, wants, &Watch::new(self.monitored))
     }

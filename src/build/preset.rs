@@ -26,3 +26,14 @@ pub enum Preset {
     #[default]
     Best,
 }
+
+impl Preset {
+    /// The [splits](super::Builder::splits) it comes with. Room enough: game levels and a kitchen use 0.05 to 0.12. With 0.1, a
+    /// level that uses 0.12 loses half its gain.
+    pub(super) const fn splits(self) -> f32 {
+        match self {
+            Self::Best => 0.3,
+            Self::Balanced | Self::Fast => 0.0,
+        }
+    }
+}

@@ -34,7 +34,7 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
     ///
     /// let mut positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
     /// let indices = [[0, 1, 2_u32]];
-    /// let mut bvh = Builder::preset(Preset::Balanced).build(&TriangleMesh::new(&positions, &indices)?)?;
+    /// let mut bvh = Builder::new().preset(Preset::Balanced).build(&TriangleMesh::new(&positions, &indices)?)?;
     /// positions.iter_mut().for_each(|[_, _, z]| *z += 1.0);
     /// bvh.refit(&TriangleMesh::new(&positions, &indices)?)?;
     /// let hit = bvh.closest_hit(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])).unwrap();

@@ -192,7 +192,7 @@ fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
     check_bvh(&bvh, &all, aabb);
     check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
     for preset in [Preset::Fast, Preset::Balanced] {
-        let builder = Builder::preset(preset);
+        let builder = Builder::new().preset(preset);
         check_bvh(&builder.build(&mesh).unwrap(), &all, aabb);
         check_bvh(&builder.build_as::<Node4>(&mesh).unwrap(), &all, aabb);
     }
@@ -568,7 +568,7 @@ fn the_same_on_any_number_of_threads() {
                 .num_threads(threads)
                 .build()
                 .unwrap()
-                .install(|| Builder::preset(preset).build(&mesh).unwrap())
+                .install(|| Builder::new().preset(preset).build(&mesh).unwrap())
         };
         let one = build(1);
         for threads in [2, 7] {
@@ -616,7 +616,9 @@ fn progress_and_cancel() {
     let indices = soup(&positions);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
     for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
-        check_cancel(Builder::preset(preset), |builder| builder.build(&mesh));
+        check_cancel(Builder::new().preset(preset), |builder| {
+            builder.build(&mesh)
+        });
     }
     let (tree, new) = (chain(3000), Builder::new());
     check_cancel(new, |builder| builder.build_from_tree(&mesh, &tree));

@@ -75,7 +75,7 @@ impl Variants {
             compact::<CompactNode4>(&builder, &mesh),
         );
         for preset in [Preset::Balanced, Preset::Fast] {
-            let builder = Builder::preset(preset).drop_non_finite(true);
+            let builder = Builder::new().preset(preset).drop_non_finite(true);
             let name = |kind| format!("{preset:?}, {kind}");
             let bvh = builder.build_as::<Node8>(&mesh).unwrap();
             add(&mut queries, name("8-wide"), bvh);

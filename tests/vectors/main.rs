@@ -49,7 +49,7 @@ trait Ask {
         on_all(|vectors, _| {
             let mesh = TriangleMesh::new(&vectors.positions, &vectors.indices).unwrap();
             for preset in [Preset::Best, Preset::Balanced, Preset::Fast] {
-                let builder = Builder::preset(preset);
+                let builder = Builder::new().preset(preset);
                 self.ask_on_backends(builder.build_as::<Node8>(&mesh).unwrap(), vectors);
                 self.ask_on_backends(builder.build_as::<Node4>(&mesh).unwrap(), vectors);
             }

@@ -28,9 +28,12 @@ pub fn engines(
 /// Every way to build, by name. All make trees of 8-wide nodes.
 fn recipes() -> Vec<(&'static str, Builder<'static>)> {
     vec![
-        ("wide-bvh 8 Fast", Builder::preset(Preset::Fast)),
-        ("wide-bvh 8 Balanced", Builder::preset(Preset::Balanced)),
-        ("wide-bvh 8 Best", Builder::preset(Preset::Best)),
+        ("wide-bvh 8 Fast", Builder::new().preset(Preset::Fast)),
+        (
+            "wide-bvh 8 Balanced",
+            Builder::new().preset(Preset::Balanced),
+        ),
+        ("wide-bvh 8 Best", Builder::new().preset(Preset::Best)),
     ]
 }
 

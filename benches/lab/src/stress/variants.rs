@@ -41,12 +41,12 @@ const BUILDS: [Build; 6] = [
     },
     Build {
         name: "fast",
-        builder: || Builder::preset(Preset::Fast),
+        builder: || Builder::new().preset(Preset::Fast),
         from_tree: false,
     },
     Build {
         name: "balanced",
-        builder: || Builder::preset(Preset::Balanced),
+        builder: || Builder::new().preset(Preset::Balanced),
         from_tree: false,
     },
     Build {
