@@ -12,6 +12,59 @@ use crate::{
 /// rounding of [`intersect`](Self::intersect): a hit counts if the ray passes the primitive's own
 /// box, and its `t` is put into the interval in which it does so. The boxes must be those that the
 /// hierarchy was built on; if they are not, hits may be lost, and nothing worse.
+///
+/// Copies of a mesh, each in a place of its own, are primitives whose intersection is the mesh's:
+///
+/// ```
+/// use wide_bvh::{
+///     Aabb, Builder, Bvh8, Hit, Ray, TriangleMesh,
+///     glam::{Affine3A, Vec3},
+///     layout::PrimitiveBvh8,
+///     primitive::Primitives,
+/// };
+///
+/// struct Copies<'a> {
+///     mesh: &'a Bvh8,
+///     /// From the world to where the mesh is as it was built.
+///     inverses: Vec<Affine3A>,
+///     aabbs: Vec<Aabb>,
+/// }
+///
+/// impl Primitives for Copies<'_> {
+///     /// Of the mesh: which triangle of the copy, and where.
+///     type Detail = Hit;
+///
+///     fn aabb(&self, copy: u32) -> Aabb {
+///         self.aabbs[copy as usize]
+///     }
+///
+///     fn intersect(&self, copy: u32, ray: &Ray) -> Option<(f32, Hit)> {
+///         let inverse = &self.inverses[copy as usize];
+///         // Not normalised: `t` is then the same there and here.
+///         let ray = Ray {
+///             origin: inverse.transform_point3(ray.origin),
+///             direction: inverse.transform_vector3(ray.direction),
+///             ..*ray
+///         };
+///         self.mesh.closest_hit(&ray).map(|hit| (hit.t, hit))
+///     }
+/// }
+///
+/// let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
+/// let mesh = Builder::new().build(&TriangleMesh::new(&positions, &[[0, 1, 2_u32]])?)?;
+/// let places = [0.0, 2.0, 4.0].map(|x| Affine3A::from_translation(Vec3::new(x, 0.0, -x)));
+/// let corners = |place: Affine3A| positions.map(|corner| place.transform_point3(corner.into()));
+/// let copies = Copies {
+///     mesh: &mesh,
+///     inverses: places.iter().map(Affine3A::inverse).collect(),
+///     aabbs: places.iter().map(|&place| Aabb::from_points(corners(place))).collect(),
+/// };
+/// let scene: PrimitiveBvh8 = Builder::new().build_primitives(&copies.aabbs)?;
+///
+/// let hit = scene.closest_hit(&copies, &Ray::new([2.2, 0.2, 0.0], [0.0, 0.0, 1.0])).unwrap();
+/// assert_eq!((hit.primitive, hit.t, hit.detail.primitive), (1, 3.0, 0));
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub trait Primitives {
     /// What the caller wants to know of a hit beyond `t`: coordinates, a normal, a part's number.
     type Detail: Copy;
