@@ -1,10 +1,12 @@
-//! Meshes and rays of any bits, for both widths, every query and every backend, held to the reference.
+//! Meshes and rays of any bits, for both widths, every layout, query and backend, held to the reference.
 #![no_main]
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use wide_bvh::layout::{Node4, Node8};
-use wide_bvh_fuzz::{MeshBytes, RayBytes, Settings, Width, assert_all, of_mesh, rays};
+use wide_bvh_fuzz::{
+    MeshBytes, RayBytes, Settings, Width, assert_all, assert_compact, of_mesh, rays,
+};
 
 #[derive(Arbitrary, Debug)]
 struct Input {
@@ -32,4 +34,5 @@ fuzz_target!(|input: Input| {
         &rays,
         &truth,
     );
+    assert_compact(&builder, &mesh, &rays, &truth);
 });

@@ -2,11 +2,13 @@
 //!
 //! - `open`: the hierarchy that bytes are, whichever of all there are, asked in every way.
 //! - `float`, `mesh`, `boxes`, `rays`, `settings`: the inputs.
-//! - `width`: builds and queries, for nodes of each width; `ask`: every query there is, on every backend.
+//! - `width`: builds and queries, for nodes of each width; `ask`: every query there is, on every backend; `compact`: both, of leaves
+//!   that read a mesh.
 //! - `truth`: what the reference says.
 
 mod ask;
 mod boxes;
+mod compact;
 mod float;
 mod mesh;
 mod open;
@@ -17,6 +19,7 @@ mod width;
 
 pub use ask::{Answers, Found, found};
 pub use boxes::{BoxBytes, Liar, boxes, corners};
+pub use compact::assert_compact;
 pub use float::{Float, floats};
 pub use mesh::{Mesh, MeshBytes, Move, moved};
 pub use open::{Opened, open};
