@@ -208,9 +208,10 @@ fn fill<I: Input>(
     ends.push(0);
     for range in ranges {
         let first = primitives.len();
-        primitives.extend_from_slice(&order[range.clone()]);
+        let numbers = order[range.clone()].iter();
+        primitives.extend(numbers.map(|&number| input.primitive(number)));
         primitives[first..].sort_unstable();
-        // Pieces of a triangle that have met again.
+        // Pieces of a triangle may have met again.
         let mut end = first;
         for place in first..primitives.len() {
             if place == first || primitives[place] != primitives[place - 1] {

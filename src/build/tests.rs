@@ -394,21 +394,26 @@ fn large_triangles_are_cut() {
             .collect();
         let indices = soup(&positions);
         let mesh = TriangleMesh::new(&positions, &indices).unwrap();
-        let whole = Builder::new().splits(0.0).build(&mesh).unwrap();
-        let kept = whole.sorted_primitives();
-        for fraction in [0.1, 0.5, f32::INFINITY] {
-            let cut = Builder::new().splits(fraction).build(&mesh).unwrap();
-            check_pieces(&cut, &kept, &mesh);
-            let report = cut.report();
-            let most = (kept.len() as f32 * (1.0 + fraction)) as usize;
-            assert!(report.references <= most);
-            assert!(scale < 1e-40 || report.references > report.primitives);
-        }
-        for fraction in [-1.0, f32::NAN] {
-            assert_same(
-                &whole,
-                &Builder::new().splits(fraction).build(&mesh).unwrap(),
-            );
+        for preset in [Preset::Best, Preset::Balanced] {
+            let builder = Builder::new().preset(preset);
+            let whole = builder.splits(0.0).build(&mesh).unwrap();
+            let kept = whole.sorted_primitives();
+            for fraction in [0.1, 0.5, f32::INFINITY] {
+                let cut = builder.splits(fraction).build(&mesh).unwrap();
+                check_pieces(&cut, &kept, &mesh);
+                let report = cut.report();
+                let most = (kept.len() as f32 * (1.0 + fraction)) as usize;
+                assert!(report.references <= most);
+                assert!(scale < 1e-40 || report.references > report.primitives);
+                let compact = builder.splits(fraction).build_compact::<Node8>(&mesh);
+                let mut numbers = compact.unwrap().primitives().to_vec();
+                numbers.sort_unstable();
+                numbers.dedup();
+                assert_eq!(numbers, kept);
+            }
+            for fraction in [-1.0, f32::NAN] {
+                assert_same(&whole, &builder.splits(fraction).build(&mesh).unwrap());
+            }
         }
     }
 }
