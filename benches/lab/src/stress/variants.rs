@@ -33,7 +33,7 @@ struct Build {
     from_tree: bool,
 }
 
-const BUILDS: [Build; 6] = [
+const BUILDS: [Build; 7] = [
     Build {
         name: "default build",
         builder: Builder::new,
@@ -57,6 +57,11 @@ const BUILDS: [Build; 6] = [
     Build {
         name: "many splits",
         builder: || Builder::new().splits(4.0),
+        from_tree: false,
+    },
+    Build {
+        name: "balanced, many splits",
+        builder: || Builder::new().preset(Preset::Balanced).splits(4.0),
         from_tree: false,
     },
     Build {
