@@ -93,10 +93,10 @@ impl<'m> Builder<'m> {
     /// How many references to triangles may be added by cutting large triangles in pieces, as a fraction of their
     /// number; 0 or less, or NaN, is none. A triangle in pieces is in more than one leaf.
     ///
-    /// For [`Preset::Best`] it is 0.3, of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
+    /// Unless it is set, it is 0, and 0.3 for [`Preset::Best`], of which little is used: a scan gets 1 % more references, game levels 5 to 12 %,
     /// which takes 6 to 15 % more memory, and up to 9 % off the nodes and leaves that a ray meets.
     ///
-    /// What takes a mesh and no tree cuts triangles, but not for [`Preset::Fast`].
+    /// Builds that take a mesh and no tree, and whose preset is not [`Preset::Fast`], are those that cut.
     pub fn splits(mut self, fraction: f32) -> Self {
         self.splits = Some(fraction);
         self

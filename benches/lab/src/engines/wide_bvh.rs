@@ -26,15 +26,13 @@ pub fn engines(
 }
 
 /// Every way to build, by name. All make trees of 8-wide nodes.
-fn recipes() -> Vec<(&'static str, Builder<'static>)> {
-    vec![
-        ("wide-bvh 8 Fast", Builder::new().preset(Preset::Fast)),
-        (
-            "wide-bvh 8 Balanced",
-            Builder::new().preset(Preset::Balanced),
-        ),
-        ("wide-bvh 8 Best", Builder::new().preset(Preset::Best)),
+fn recipes() -> [(&'static str, Builder<'static>); 3] {
+    [
+        ("wide-bvh 8 Fast", Preset::Fast),
+        ("wide-bvh 8 Balanced", Preset::Balanced),
+        ("wide-bvh 8 Best", Preset::Best),
     ]
+    .map(|(name, preset)| (name, Builder::new().preset(preset)))
 }
 
 /// Its builders.
