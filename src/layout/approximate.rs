@@ -1,13 +1,14 @@
 //! The same leaves, their triangles tested in `f32` alone.
 
 use super::{
-    Borrowed, Bvh, LayoutError, Leaves, Storage, TriangleLeaf, TriangleLeaves, Triangles, WideNode,
+    Borrowed, Bvh, Gather, Gathered, LayoutError, Leaves, Storage, TriangleLeaf, TriangleLeaves,
+    Triangles, WideNode,
 };
 use crate::{
     primitive::triangle::{InFloats, Look, Precision, RayShear, TriangleHits},
     simd::Simd,
 };
-use core::{marker::PhantomData, ops::Range};
+use core::{marker::PhantomData, mem::MaybeUninit, ops::Range};
 
 /// Leaves `L`, with a triangle test that leaves out what makes it exact: see [`Bvh::approximate`].
 #[derive(Clone, Copy, Debug)]
@@ -128,13 +129,24 @@ impl<R: Triangles> Triangles for ApproximateRef<R> {
     fn triangle(self, lane: usize) -> [[f32; 3]; 3] {
         self.0.triangle(lane)
     }
+}
 
+impl<R: Gathered> Gathered for ApproximateRef<R> {
     #[inline(always)]
-    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
+    fn stored<'a>(self) -> &'a TriangleLeaf
     where
         Self: 'a,
     {
-        self.0.shared()
+        self.0.stored()
+    }
+}
+
+impl<R: Gather> Gather for ApproximateRef<R> {
+    type Gathered<'a> = ApproximateRef<R::Gathered<'a>>;
+
+    #[inline(always)]
+    fn gather(self, from: usize, room: &mut MaybeUninit<TriangleLeaf>) -> Self::Gathered<'_> {
+        ApproximateRef(self.0.gather(from, room))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Leaves that are stored: a few triangles that share vertices, or a few of a caller's primitives.
 
 use super::{
-    Listed, Triangles,
+    Gather, Gathered, Listed, Triangles,
     bytes::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES},
     leaves::in_lanes,
 };
@@ -10,7 +10,7 @@ use crate::{
     simd::{MAX_RUN, Simd},
 };
 use bytemuck::{Pod, Zeroable};
-use core::{fmt::Debug, ops::Range};
+use core::{fmt::Debug, mem::MaybeUninit, ops::Range};
 use glam::Vec3;
 
 /// What all leaves that are stored have: primitives, as a run of places in the hierarchy's list of primitive numbers.
@@ -85,8 +85,8 @@ impl TriangleLeaf {
         })
     }
 
-    /// A leaf of `count` triangles, whose corners are lanes of `vertices`; both repeat the first past the last.
-    #[cfg(feature = "std")]
+    /// A leaf of `count` triangles, whose corners are lanes of `vertices`; both repeat the first past the last, in leaves that
+    /// are kept.
     #[inline(always)]
     pub(crate) fn from_lanes(
         vertices: [[f32; 8]; 3],
@@ -111,14 +111,6 @@ impl<'a> Triangles for &'a TriangleLeaf {
     #[inline(always)]
     fn four(self, number: usize) -> Option<FourOfLeaf<'a>> {
         (4 * number < self.count()).then_some(FourOfLeaf { leaf: self, number })
-    }
-
-    #[inline(always)]
-    fn shared<'b>(self) -> Option<&'b TriangleLeaf>
-    where
-        Self: 'b,
-    {
-        Some(self)
     }
 
     #[inline(always)]
@@ -151,6 +143,25 @@ impl<'a> Triangles for &'a TriangleLeaf {
                 corners[lane % TriangleLeaf::MAX_TRIANGLES] as usize % TriangleLeaf::MAX_VERTICES;
             [x[vertex], y[vertex], z[vertex]]
         })
+    }
+}
+
+impl Gathered for &TriangleLeaf {
+    #[inline(always)]
+    fn stored<'a>(self) -> &'a TriangleLeaf
+    where
+        Self: 'a,
+    {
+        self
+    }
+}
+
+impl Gather for &TriangleLeaf {
+    type Gathered<'a> = Self;
+
+    #[inline(always)]
+    fn gather(self, _: usize, _: &mut MaybeUninit<TriangleLeaf>) -> Self {
+        self
     }
 }
 

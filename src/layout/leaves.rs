@@ -1,6 +1,6 @@
 //! How a hierarchy keeps its leaves, and what the traversal needs of those that hold triangles.
 
-use super::{Borrowed, LayoutError, Leaf, Storage, TriangleLeaf};
+use super::{Borrowed, Gather, LayoutError, Leaf, Storage};
 use crate::{
     primitive::{
         exact::{Pair, Pairs},
@@ -157,15 +157,6 @@ pub trait Triangles: Copy {
         t_max: f32,
     ) -> Option<TriangleHits<Self::Lanes<S>>>;
 
-    /// The leaf, if it has vertices that triangles share.
-    #[inline(always)]
-    fn shared<'a>(self) -> Option<&'a TriangleLeaf>
-    where
-        Self: 'a,
-    {
-        None
-    }
-
     /// A bit for each triangle there is.
     #[inline(always)]
     fn lanes(self) -> u32 {
@@ -273,5 +264,5 @@ pub trait Listed: Copy {
 }
 
 /// Leaves of triangles.
-pub trait TriangleLeaves: for<'a> Leaves<Ref<'a>: Triangles> {}
-impl<L: for<'a> Leaves<Ref<'a>: Triangles>> TriangleLeaves for L {}
+pub trait TriangleLeaves: for<'a> Leaves<Ref<'a>: Gather> {}
+impl<L: for<'a> Leaves<Ref<'a>: Gather>> TriangleLeaves for L {}

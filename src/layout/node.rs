@@ -52,10 +52,17 @@ pub trait WideNode: Pod + sealed::Sealed {
         slabs: &BundleSlabs,
         t_max: Self::Lanes<S>,
     ) -> (u32, Self::Lanes<S>);
-    /// As [`test`](Self::test), of the ray in lane `ray` modulo 8 of eight, which is number `ray` in `passing`.
+    /// The planes of all children's boxes that a bundle's rays meet first, by axis, and those that they meet last.
+    #[doc(hidden)]
+    fn planes<S: Simd>(&self, token: S, slabs: &BundleSlabs) -> [[Self::Lanes<S>; 3]; 2];
+    /// Of children, a bit each, those that there are.
+    #[doc(hidden)]
+    fn present(&self, children: u32) -> u32;
+    /// As [`test`](Self::test), of [planes](Self::planes) and the ray in lane `ray` modulo 8 of eight, which is number `ray` in
+    /// `passing`. Children that there are not are left in.
     #[doc(hidden)]
     fn test_one_of<S: Simd>(
-        &self,
+        planes: &[[Self::Lanes<S>; 3]; 2],
         token: S,
         slabs: &RaySlabs<8, S::F32x8>,
         t_max: &S::F32x8,
@@ -171,8 +178,18 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
+            fn planes<S: Simd>(&self, token: S, slabs: &BundleSlabs) -> [[S::$vector; 3]; 2] {
+                self.planes::<S::$vector>(token, slabs.first())
+            }
+
+            #[inline(always)]
+            fn present(&self, children: u32) -> u32 {
+                self.present_bits(children)
+            }
+
+            #[inline(always)]
             fn test_one_of<S: Simd>(
-                &self,
+                &[near, far]: &[[S::$vector; 3]; 2],
                 token: S,
                 slabs: &RaySlabs<8, S::F32x8>,
                 t_max: &S::F32x8,
@@ -180,8 +197,8 @@ macro_rules! impl_wide_node {
                 passing: &mut Passing<S::$vector>,
             ) {
                 let t_max = <S::$vector>::splat(token, lane(t_max, ray));
-                let slabs = slabs.of_lane(token, ray);
-                let (hit, near) = self.test_lanes(token, &slabs, t_max);
+                let slabs: RaySlabs<$width, S::$vector> = slabs.of_lane(token, ray);
+                let (hit, near) = slabs.between(near, far, t_max);
                 passing.add(token, ray, hit, near);
             }
 

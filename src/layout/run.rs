@@ -1,14 +1,15 @@
 //! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
 
 use super::{
-    Borrowed, Bvh, LayoutError, Leaves, Listed, Storage, Triangles, WideNode, leaves::in_lanes,
+    Borrowed, Bvh, Gather, LayoutError, Leaves, Listed, Storage, TriangleLeaf, Triangles, WideNode,
+    gather::Gathering, leaves::in_lanes,
 };
 use crate::{
     geometry::TriangleMesh,
     primitive::triangle::{Exact, Look, RayShear, Sheared},
     simd::{MAX_RUN, RUN_FIRST_BITS, Simd, packed_run},
 };
-use core::{error::Error, fmt, ops::Range};
+use core::{error::Error, fmt, mem::MaybeUninit, ops::Range};
 
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
@@ -194,6 +195,23 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
         // SAFETY: vertices of a triangle of the mesh.
         self.vertices(lane)
             .map(|vertex| unsafe { *self.position(vertex) })
+    }
+}
+
+impl Gather for Run<'_, TriangleMesh<'_>> {
+    type Gathered<'a> = &'a TriangleLeaf;
+
+    #[inline(always)]
+    fn gather(self, from: usize, room: &mut MaybeUninit<TriangleLeaf>) -> &TriangleLeaf {
+        let mut gathering = Gathering::NONE;
+        for lane in from..self.count() {
+            // SAFETY: vertices of a triangle of the mesh.
+            let vertex = |number| (number, unsafe { self.position(number) });
+            if !gathering.add(self.vertices(lane).map(vertex)) {
+                break;
+            }
+        }
+        room.write(gathering.leaf(self.first() + from))
     }
 }
 

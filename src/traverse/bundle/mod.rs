@@ -12,16 +12,16 @@ mod packet;
 mod ways;
 
 use self::{
-    packet::{Packet, V},
+    packet::{Asked, Packet, V},
     ways::{Entry, Ways, insert},
 };
 use super::{query::Query, triangles::Found};
 use crate::{
     geometry::{Aabb, Ray},
-    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
+    layout::{Bvh, Child, Gather, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::bits,
     simd::{Lanes, Simd, Vector, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, most, passing, reach},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, most, passing},
 };
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -31,8 +31,10 @@ pub(super) const RAYS: usize = 64;
 /// Rays tested at a time.
 const LANES: usize = 8;
 const PACKETS: usize = RAYS / LANES;
-/// No more rays than this of a packet at a leaf are tested one by one.
-const FEW_AT_LEAF: u32 = 2;
+/// No more rays than this at a leaf are tested one by one, against its triangles where they are.
+const FEW_AT_LEAF: u32 = 3;
+/// No more rays than this of a packet there are tested one by one, against its triangles brought together.
+const FEW_IN_PACKET: u32 = 2;
 /// No more rays than this at a node are: against all children at once.
 const FEW_AT_NODE: u32 = 12;
 /// The same of a bundle that is one packet: all of it takes hardly more than one of its rays.
@@ -339,16 +341,18 @@ impl<'a, T: Simd> Bundle<'a, T> {
     ) {
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { bvh.node(current) };
+        // Of compact nodes worked out, and so once for all.
+        let planes = node.planes(token, &self.slabs);
         let mut halves = [Passing::<N::Lanes<T>>::none(token); 2];
         const { assert!(RAYS == 2 * passing::RAYS) };
         for (half, passing) in halves.iter_mut().enumerate() {
             let first = half * passing::RAYS;
             for ray in bits((rays >> first) as u32) {
                 let packet = self.packet((first + ray) / LANES);
-                node.test_one_of(token, &packet.slabs, &packet.far, ray, passing);
+                N::test_one_of(&planes, token, &packet.slabs, &packet.far, ray, passing);
             }
         }
-        let mut children = halves[0].children() | halves[1].children();
+        let mut children = node.present(halves[0].children() | halves[1].children());
         let (low, high) = (halves[0].rays(), halves[1].rays());
         let nears = (halves[0].near(), halves[1].near());
         let base = *len;
@@ -396,32 +400,55 @@ impl<'a, T: Simd> Bundle<'a, T> {
 
     /// Tests the leaf's triangles for some of the rays.
     #[inline(always)]
-    fn test_leaf<Q: Query>(
-        &mut self,
-        token: T,
-        leaf: impl Triangles,
-        primitives: &[u32],
-        rays: u64,
-    ) {
-        let mut closer = 0;
-        let mut left = rays;
-        while let Some(index) = first_packet(&mut left) {
-            let lanes = u32::from((rays >> (LANES * index)) as u8);
-            let found = u32::from((self.found >> (LANES * index)) as u8);
-            let (axes, of_packet) = (self.axes, &self.rays[LANES * index..]);
-            let packet = self.packet(index);
-            let new = if lanes.count_ones() <= FEW_AT_LEAF {
-                packet.test_by_ray::<Q>(token, leaf, primitives, lanes, found, of_packet, axes)
-            } else {
-                packet.test_leaf::<Q, _>(token, leaf, primitives, lanes, found, of_packet, axes)
-            };
-            packet.far = reach(token, packet.t_max, packet.slabs.margins());
-            closer |= u64::from(new) << (LANES * index);
+    fn test_leaf<Q: Query>(&mut self, token: T, leaf: impl Gather, primitives: &[u32], rays: u64) {
+        if rays.count_ones() <= FEW_AT_LEAF {
+            let (mut new, mut left) = (0, rays);
+            while let Some(index) = first_packet(&mut left) {
+                let asked = self.asked(index, rays);
+                let packet = self.packet(index);
+                let of_packet = packet.test_by_ray::<Q>(token, leaf, primitives, asked);
+                new |= u64::from(of_packet) << (LANES * index);
+            }
+            return self.note::<Q>(token, new);
         }
-        self.found |= closer;
+        let (mut from, mut room) = (0, MaybeUninit::uninit());
+        while from < leaf.count() {
+            let triangles = leaf.gather(from, &mut room);
+            from += triangles.count();
+            let (mut new, mut left) = (0, rays);
+            while let Some(index) = first_packet(&mut left) {
+                let asked = self.asked(index, rays);
+                let packet = self.packet(index);
+                let of_packet = if asked.lanes.count_ones() <= FEW_IN_PACKET {
+                    packet.test_by_ray::<Q>(token, triangles, primitives, asked)
+                } else {
+                    packet.test_leaf::<Q, _>(token, triangles, primitives, asked)
+                };
+                new |= u64::from(of_packet) << (LANES * index);
+            }
+            self.note::<Q>(token, new);
+        }
+    }
+
+    /// What a packet is asked of some of the rays.
+    #[inline(always)]
+    fn asked(&self, index: usize, rays: u64) -> Asked<'a> {
+        let first = LANES * index;
+        Asked {
+            lanes: u32::from((rays >> first) as u8),
+            found: u32::from((self.found >> first) as u8),
+            rays: &self.rays[first..],
+            axes: self.axes,
+        }
+    }
+
+    /// Takes note of rays that have a new best hit, and how far the others still look.
+    #[inline(always)]
+    fn note<Q: Query>(&mut self, token: T, new: u64) {
+        self.found |= new;
         if !Q::CLOSEST {
-            self.looking &= !closer;
-        } else if closer != 0 {
+            self.looking &= !new;
+        } else if new != 0 {
             let mut far = V::<T>::splat(token, f32::NEG_INFINITY);
             for index in 0..self.count {
                 far = far.max(self.packet(index).far);

@@ -3,7 +3,7 @@
 use super::LANES;
 use crate::{
     geometry::{Aabb, Ray},
-    layout::Triangles,
+    layout::{Gathered, Triangles},
     primitive::{
         exact::{Pair, Pairs},
         triangle::{Along, Edges, RayShear, Sheared, bits},
@@ -15,6 +15,19 @@ use crate::{
 
 /// A number of each ray of a packet.
 pub(super) type V<T> = <T as Simd>::F32x8;
+
+/// Which of a packet's rays are asked for triangles.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    /// A bit each.
+    pub(super) lanes: u32,
+    /// The lanes that have found something.
+    pub(super) found: u32,
+    /// The packet's, and those after it.
+    pub(super) rays: &'a [Ray],
+    /// Of the shear.
+    pub(super) axes: &'static [usize; 3],
+}
 
 /// Eight rays.
 pub(super) struct Packet<T: Simd> {
@@ -83,55 +96,45 @@ impl<T: Simd> Packet<T> {
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    pub(super) fn test_leaf<Q: Query, R: Triangles>(
+    pub(super) fn test_leaf<Q: Query, G: Gathered>(
         &mut self,
         token: T,
-        leaf: R,
+        triangles: G,
         primitives: &[u32],
-        mut lanes: u32,
-        mut found: u32,
-        rays: &[Ray],
-        axes: &'static [usize; 3],
+        asked: Asked,
     ) -> u32 {
+        let Asked {
+            mut lanes,
+            mut found,
+            rays,
+            axes,
+        } = asked;
+        let leaf = triangles.stored();
         let [kx, ky, kz] = *axes;
         // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
         unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
         let nowhere = [V::<T>::splat(token, 0.0); 3];
         let mut vertices = [Sheared::new(nowhere, nowhere, [nowhere[0]; 2]); 8];
-        if let Some(leaf) = leaf.shared() {
-            let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
-            for vertex in 0..8 {
-                let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
-                vertices[vertex] = Sheared::new(position, origin, self.slope);
-            }
+        let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
+        for vertex in 0..8 {
+            let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
+            vertices[vertex] = Sheared::new(position, origin, self.slope);
         }
         let mut new = 0;
-        for triangle in 0..leaf.count() % 16 {
-            let place = leaf.first() + triangle;
+        for triangle in 0..triangles.count() % 16 {
+            let place = triangles.first() + triangle;
             let triangle = triangle % 8;
-            let [a, b, c] = if let Some(leaf) = leaf.shared() {
-                let [a, b, c] = &leaf.corners;
-                [
-                    vertices[a[triangle] as usize % 8],
-                    vertices[b[triangle] as usize % 8],
-                    vertices[c[triangle] as usize % 8],
-                ]
-            } else {
-                let mut corners = [vertices[0]; 3];
-                let own = leaf.triangle(triangle);
-                for corner in 0..3 {
-                    let position = [own[corner][kx], own[corner][ky], own[corner][kz]];
-                    let position = splat3(token, position);
-                    corners[corner] = Sheared::new(position, origin, self.slope);
-                }
-                corners
-            };
+            let [a, b, c] = &leaf.corners;
+            let [a, b, c] = [
+                vertices[a[triangle] as usize % 8],
+                vertices[b[triangle] as usize % 8],
+                vertices[c[triangle] as usize % 8],
+            ];
             let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
             let mut edges = Edges::new(token, corners, lanes);
             let pairs = OneTriangle {
-                triangles: leaf,
+                triangles,
                 triangle,
                 rays,
                 axes,
@@ -139,7 +142,7 @@ impl<T: Simd> Packet<T> {
             if !Q::CLOSEST {
                 // Not all lanes that are hit at once, but some if there are any.
                 while edges.candidates != 0 {
-                    let hits = (self.along).test::<LANES, false, R::Precision, _>(
+                    let hits = (self.along).test::<LANES, false, G::Precision, _>(
                         token, corners, edges, self.t_max, pairs,
                     );
                     let Some(hits) = hits else {
@@ -155,7 +158,7 @@ impl<T: Simd> Packet<T> {
                 continue;
             }
             let hits = (self.along)
-                .test::<LANES, true, R::Precision, _>(token, corners, edges, self.t_max, pairs);
+                .test::<LANES, true, G::Precision, _>(token, corners, edges, self.t_max, pairs);
             let Some(hits) = hits else {
                 continue;
             };
@@ -175,22 +178,25 @@ impl<T: Simd> Packet<T> {
             found |= closer;
             new |= closer;
         }
+        self.far = self.reach(token);
         new
     }
 
     /// All triangles at once, a lane after the other. The lanes that have a new best hit.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn test_by_ray<Q: Query>(
         &mut self,
         token: T,
-        leaf: impl Triangles,
+        triangles: impl Triangles,
         primitives: &[u32],
-        lanes: u32,
-        found: u32,
-        rays: &[Ray],
-        axes: &'static [usize; 3],
+        asked: Asked,
     ) -> u32 {
+        let Asked {
+            lanes,
+            found,
+            rays,
+            axes,
+        } = asked;
         let (t_max, reciprocals) = (self.t_max.to_array(), self.along.reciprocal.to_array());
         let mut new = 0;
         for lane in bits(lanes) {
@@ -201,7 +207,7 @@ impl<T: Simd> Packet<T> {
             let shear = RayShear::of(ray, axes, reciprocals[lane]);
             let mut t_max = t_max[lane];
             if !Q::CLOSEST {
-                let hit = leaf.is_hit(token, &shear, t_max);
+                let hit = triangles.is_hit(token, &shear, t_max);
                 new |= u32::from(hit) << lane;
                 continue;
             }
@@ -213,7 +219,7 @@ impl<T: Simd> Packet<T> {
                     ..Found::default()
                 });
             }
-            let closer = Found::update(token, &mut best, &mut t_max, leaf, &shear, primitives);
+            let closer = Found::update(token, &mut best, &mut t_max, triangles, &shear, primitives);
             if let (true, Some(best)) = (closer, best) {
                 let place = f32::from_bits(best.place as u32);
                 self.t_max = self.t_max.replace(token, lane, best.t);
@@ -223,7 +229,14 @@ impl<T: Simd> Packet<T> {
                 new |= 1 << lane;
             }
         }
+        self.far = self.reach(token);
         new
+    }
+
+    /// Up to which `t` boxes are of interest now.
+    #[inline(always)]
+    fn reach(&self, token: T) -> V<T> {
+        reach(token, self.t_max, self.slabs.margins())
     }
 }
 
