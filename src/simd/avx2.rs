@@ -79,7 +79,8 @@ macro_rules! impl_vector {
     (
         $vector:ident, $n:literal, $splat:ident, $load:ident, $store:ident,
         $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident, $or:ident, $andnot:ident,
-        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident, $links:ident
+        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident, $links:ident,
+        $to_int:ident, $from_int:ident, $max_int:ident, $min_int:ident
     ) => {
         impl_operator!($vector, Add, add, $add);
         impl_operator!($vector, Sub, sub, $sub);
@@ -144,6 +145,14 @@ macro_rules! impl_vector {
                 Self(unsafe { $max(self.0, other.0) })
             }
             #[inline(always)]
+            fn max_from_zero(self, other: Self) -> Self {
+                Self(unsafe { $from_int($max_int($to_int(self.0), $to_int(other.0))) })
+            }
+            #[inline(always)]
+            fn min_from_zero(self, other: Self) -> Self {
+                Self(unsafe { $from_int($min_int($to_int(self.0), $to_int(other.0))) })
+            }
+            #[inline(always)]
             fn abs(self) -> Self {
                 Self(unsafe { $andnot($splat(-0.0), self.0) })
             }
@@ -202,7 +211,11 @@ impl_vector!(
     least4,
     of_bits4,
     of_bytes4,
-    links4
+    links4,
+    _mm_castps_si128,
+    _mm_castsi128_ps,
+    _mm_max_epi32,
+    _mm_min_epi32
 );
 
 impl_vector!(
@@ -228,7 +241,11 @@ impl_vector!(
     least8,
     of_bits8,
     of_bytes8,
-    links8
+    links8,
+    _mm256_castps_si256,
+    _mm256_castsi256_ps,
+    _mm256_max_epi32,
+    _mm256_min_epi32
 );
 
 /// For a mask of lanes, their numbers in order.

@@ -99,6 +99,19 @@ fn check<const N: usize, V: Vector<N>>(token: V::Token) {
                 }
             }),
         );
+        // Those that look at bits, of numbers; -0 may count as less than 0.
+        let by_bits = [x.max_from_zero(y), x.min_from_zero(y)].map(|of_bits| of_bits.to_array());
+        for (lane, (&a, &b)) in a.iter().zip(&b).enumerate() {
+            if a.is_nan() || b.is_nan() {
+                continue;
+            }
+            let [max, min] = by_bits.map(|lanes| lanes[lane]);
+            if a.is_sign_negative() && b.is_sign_negative() {
+                assert!([max, min].iter().all(|&found| found == a || found == b));
+            } else {
+                assert_eq!([max, min], [a.max(b), a.min(b)]);
+            }
+        }
 
         let bits = rng.u32(..) & (u32::MAX >> (32 - N));
         assert_eq!(V::of_bits(token, bits).bits(), bits);

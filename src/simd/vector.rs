@@ -120,6 +120,16 @@ pub trait Vector<const N: usize>:
     fn min(self, other: Self) -> Self;
     /// The greater; either where they are equal.
     fn max(self, other: Self) -> Self;
+    /// The greater; of two negative numbers either. Integers' where those are sooner: positive floats are in their order.
+    #[inline(always)]
+    fn max_from_zero(self, other: Self) -> Self {
+        self.max(other)
+    }
+    /// The lesser; of two negative numbers either.
+    #[inline(always)]
+    fn min_from_zero(self, other: Self) -> Self {
+        self.min(other)
+    }
     /// Without the sign.
     fn abs(self) -> Self;
 

@@ -39,7 +39,6 @@ pub(crate) struct Bundling<V> {
     error: V,
     reciprocal: [[V; 3]; 2],
     offset: [[V; 3]; 2],
-    t_min: V,
 }
 
 impl<V: Lanes> Bundling<V> {
@@ -58,18 +57,16 @@ impl<V: Lanes> Bundling<V> {
             error: V::splat(token, K_BUNDLE * UNIT_ROUNDOFF * extent),
             reciprocal: [[most; 3], [least; 3]],
             offset: [[most; 3], [least; 3]],
-            t_min: most,
         }
     }
 
-    /// Adds a ray a lane. `t_min` is less the margin.
+    /// Adds a ray a lane.
     #[inline(always)]
     pub(crate) fn add<const N: usize>(
         &mut self,
         token: V::Token,
         origin: [V; 3],
         reciprocal: [V; 3],
-        t_min: V,
     ) where
         V: Vector<N>,
     {
@@ -85,12 +82,11 @@ impl<V: Lanes> Bundling<V> {
             least[axis] = least[axis].min(at_center - error);
             most[axis] = most[axis].max(at_center + error);
         }
-        self.t_min = self.t_min.min(t_min);
     }
 
-    /// All that were added. `direction` is that of any.
+    /// All that were added. `direction` is that of any, and no hit is before `start`.
     #[inline(always)]
-    pub(crate) fn finish<const N: usize>(self, direction: Vec3) -> BundleSlabs
+    pub(crate) fn finish<const N: usize>(self, direction: Vec3, start: f32) -> BundleSlabs
     where
         V: Vector<N>,
     {
@@ -99,7 +95,7 @@ impl<V: Lanes> Bundling<V> {
             center: [x.to_array()[0], y.to_array()[0], z.to_array()[0]],
             reciprocal: [least3(self.reciprocal[0]), most3(self.reciprocal[1])],
             offset: [least3(self.offset[0]), most3(self.offset[1])],
-            t_min: least(self.t_min),
+            t_min: start,
             direction,
         }
     }

@@ -15,7 +15,7 @@
 //! max(near, t_min - S(t_min)) <= min(far, t_max + S(t_max)),  S(t) = u·D·|r.z| + K_RELATIVE·u·|t|
 //! ```
 //!
-//! with z the axis of the largest direction component. Let M be the largest |vertex - o| of a triangle on
+//! with z the axis of the largest direction component; but no t is taken to begin before 0, which is seen to in (7). Let M be the largest |vertex - o| of a triangle on
 //! any axis: M <= D(1 + u).
 //!
 //! *(1) An accepted triangle has a point near the ray.* The edge functions have exact signs, so the triangle,
@@ -67,6 +67,18 @@
 //! right. Below, D and M are never taken as less than 2^-70, which covers the absolute error of
 //! results that are denormal, or flushed to zero by a program that has asked for it.
 //!
+//! *(7) t begins at 0 or later.* The greater and the lesser of two numbers are found by their bits, as integers, where
+//! that is sooner: as it should be, but for two negative ones, of which it may be either. So the left side of the test is
+//! never negative, and the right side is just when it should be.
+//!
+//! - If t_min >= 0, the left side is the greater of 0 and what it was. Then t* may be left of 0, by no more than
+//!   S(0) = u·D·|r.z|, and far has to be 0 at least: |r.z| is the least of |r|, (3) needs 1 of the 3 u·D·|r| that are left
+//!   of K_BOX, and this 1 more.
+//! - Else t is moved: s is added to near, far and the range's end, with -s = t_min - S(t_min), or -1.01·D·|r.z|, before
+//!   which nothing is hit by (1) or (5). Roundings are more: u·s of s itself as it is widened, u·(|o·r| + E + s) of what is
+//!   added up, and u·s of the last sum: 4u·D·|r| and some. Near and far are moved apart by a fourth of far - near, which is
+//!   2E less roundings of 2u·D·|r|: 6u·D·|r|. The end has s·(1 + 2^-20), for its own.
+//!
 //! An empty lane (lo = ∞, hi = -∞) has near = ∞ and is never passed.
 //!
 //! The known ways are Williams et al., "An Efficient and Robust Ray-Box Intersection Algorithm" (2005),
@@ -79,7 +91,7 @@ pub(crate) mod passing;
 mod prepared;
 
 pub use bundle::BundleSlabs;
-pub(crate) use bundle::{Bundling, most};
+pub(crate) use bundle::{Bundling, least, most};
 pub use narrow::NarrowRay;
 pub use passing::Passing;
 pub(crate) use prepared::{PreparedRay, pow2, reciprocals, unscaled};
@@ -100,6 +112,8 @@ const K_RELATIVE: f32 = 272.0;
 const K_PRIMITIVE: f32 = 6.0;
 /// How far off a triangle's `t` may be in `f32`: (4) above.
 pub(crate) const CONDITION: f32 = 16.0;
+/// No `t` of a hit is less than this times the negative of what S has of the scene: (7) above.
+const EARLIEST: f32 = 1.01 / UNIT_ROUNDOFF;
 /// No distance is taken to be smaller when errors are estimated: (6) above.
 const MIN_EXTENT: f32 = pow2(-70);
 /// Up to here nothing overflows: (6) above.
@@ -111,9 +125,9 @@ pub struct RaySlabs<const N: usize, V> {
     reciprocal: [V; 3],
     near: [V; 3],
     far: [V; 3],
-    /// The least `t`, less S of it.
+    /// The least `t`, less S of it, but no less than 0 where [`between`](Self::between) takes numbers by their bits.
     t_min: V,
-    /// Of S, what is of the scene.
+    /// Of S, what is of the scene; and by how much `t` was moved.
     margin: V,
     /// How many bytes after the first of a node's planes those are that are met first, by axis.
     first: [usize; 3],
@@ -193,6 +207,29 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         (slabs, extent)
     }
 
+    /// Has `t` begin at 0 or later, by moving it if it does not: (7) above. `t_min` is the rays'. Before which `t` nothing is
+    /// hit, as it was.
+    #[inline(always)]
+    pub(crate) fn begin_at_zero(&mut self, token: V::Token, t_min: V) -> V {
+        let zero = V::splat(token, 0.0);
+        if t_min.lt(zero).bits() == 0 {
+            let start = self.t_min;
+            self.t_min = start.max(zero);
+            return start;
+        }
+        let earliest = zero - self.margin * V::splat(token, EARLIEST);
+        let start = self.t_min.max(earliest);
+        let shift = zero - start.min(zero);
+        self.t_min = start.max(zero);
+        self.margin = self.margin + shift * V::splat(token, 1.0 + pow2(-20));
+        for axis in 0..3 {
+            let (near, far) = (&mut self.near[axis], &mut self.far[axis]);
+            let wider = (*far - *near) * V::splat(token, 0.25);
+            (*near, *far) = (*near + (shift - wider), *far + (shift + wider));
+        }
+        start
+    }
+
     /// Those of the ray in a lane, in every lane of other vectors.
     #[inline(always)]
     pub(crate) fn of_lane<const M: usize, W: Vector<M, Token = V::Token>>(
@@ -229,12 +266,6 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         self.reciprocal
     }
 
-    /// The least `t`, less the margin.
-    #[inline(always)]
-    pub(crate) fn t_min(&self) -> V {
-        self.t_min
-    }
-
     /// Has every box passed but the empty one.
     #[cold]
     #[inline(never)]
@@ -265,8 +296,12 @@ impl<const N: usize, V: Vector<N>> RaySlabs<N, V> {
         let far_x = far[0].mul_add(rx, self.far[0]);
         let far_y = far[1].mul_add(ry, self.far[1]);
         let far_z = far[2].mul_add(rz, self.far[2]);
-        let near = near_x.max(near_y).max(near_z.max(self.t_min));
-        let far = far_x.min(far_y).min(far_z.min(t_max));
+        let near = near_x
+            .max_from_zero(near_y)
+            .max_from_zero(near_z.max_from_zero(self.t_min));
+        let far = far_x
+            .min_from_zero(far_y)
+            .min_from_zero(far_z.min_from_zero(t_max));
         (near.le(far), near)
     }
 

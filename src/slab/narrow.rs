@@ -77,11 +77,28 @@ impl NarrowRay {
         let t_min = F32x1(prepared.ray.t_min);
         let margin = F32x1(extent * UNIT_ROUNDOFF * room.along.abs());
         room.margin = margin.0;
-        room.t_min = (t_min - slack(Portable, t_min, margin)).0;
+        let start = (t_min - slack(Portable, t_min, margin)).0;
+        room.t_min = greater(start, 0.0);
+        if t_min.0 < 0.0 {
+            room.move_to_zero(start, t_min);
+        }
         if extent >= MAX_EXTENT {
             room.open();
         }
         room
+    }
+
+    /// [`RaySlabs::begin_at_zero`], of a ray whose least `t`, less the margin, is `start`.
+    #[cold]
+    #[inline(never)]
+    fn move_to_zero(&mut self, start: f32, t_min: F32x1) {
+        self.t_min = start;
+        let mut slabs: RaySlabs<1, F32x1> = self.widen(Portable);
+        slabs.begin_at_zero(Portable, t_min);
+        self.near = slabs.near.map(|x| x.0);
+        self.far = slabs.far.map(|x| x.0);
+        self.t_min = slabs.t_min.0;
+        self.margin = slabs.margin.0;
     }
 
     /// Has every box passed but the empty one.
@@ -114,8 +131,9 @@ impl NarrowRay {
             ordinary,
         } = prepared;
         let [t_min, _] = range;
-        let (slabs, extent) =
+        let (mut slabs, extent) =
             RaySlabs::of_lanes(token, origin, reciprocal, t_min, Vec3::ONE, bounds);
+        slabs.begin_at_zero(token, t_min);
         let side = width * size_of::<f32>();
         // Numbers of bytes, as bits.
         let [mut x, mut y, mut z] = splat3(token, [0.0; 3]);
@@ -170,5 +188,83 @@ impl NarrowRay {
     #[inline(always)]
     pub(crate) fn along(&self) -> f32 {
         self.along
+    }
+}
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::Ray,
+        layout::{Child, Node8, WideNode},
+        simd::Backend,
+        traverse::sweep::{count_boxes, count_boxes_of_bundle},
+    };
+    use fastrand::Rng;
+    use std::vec::Vec;
+
+    /// Boxes that a ray passes by definition, with what rounding may do to either side.
+    fn count_exactly(boxes: &[Aabb], ray: &Ray) -> [u32; 2] {
+        let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let passed = |aabb: &&Aabb, more: f64| {
+            let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+            for axis in 0..3 {
+                let [a, b] = [aabb.min, aabb.max].map(|p| (f64::from(p[axis]) - o[axis]) / d[axis]);
+                near = near.max(a.min(b));
+                far = far.min(a.max(b));
+            }
+            near <= far + more
+        };
+        [-1e-5, 1e-5].map(|more| boxes.iter().filter(|aabb| passed(aabb, more)).count() as u32)
+    }
+
+    /// No more boxes than there are are passed, wherever the range begins: not those behind the ray either.
+    #[test]
+    fn boxes_are_passed_within_ranges_of_any_sign() {
+        let mut rng = Rng::with_seed(7);
+        let mut point = |size: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * size;
+        let boxes: Vec<_> = (0..800)
+            .map(|_| {
+                let min = point(10.0);
+                Aabb::new(min, min + point(2.0))
+            })
+            .collect();
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, aabb| all.join(*aabb));
+        let nodes: Vec<_> = boxes
+            .chunks(8)
+            .map(|boxes| Node8::from_children(boxes.iter().map(|&aabb| (aabb, Child::leaf(0)))))
+            .collect();
+        let mut counted = 0;
+        for _ in 0..200 {
+            let ray = Ray::new(point(10.0), point(2.0) - Vec3::ONE);
+            let (inf, some) = (f32::INFINITY, 0.1 + point(6.0).x);
+            for (t_min, t_max) in [
+                (0.0, inf),
+                (-0.0, some),
+                (some, inf),
+                (-inf, inf),
+                (-inf, 0.0),
+                (-inf, -some),
+                (-f32::MAX, f32::MAX),
+                (-some, some),
+                (-2.0 * some, -some),
+                (-1e-30, 1e-30),
+            ] {
+                let ray = ray.with_range(t_min, t_max);
+                let [least, most] = count_exactly(&boxes, &ray);
+                counted += least;
+                for backend in Backend::available() {
+                    let passed = count_boxes(backend, &nodes, &bounds, &ray);
+                    assert!(least <= passed && passed <= most, "{backend:?} {ray:?}");
+                    let alike = [ray; 3];
+                    let passed = count_boxes_of_bundle(backend, &nodes, &bounds, &alike);
+                    assert!(
+                        passed.is_some_and(|passed| least <= passed),
+                        "{backend:?} {ray:?}"
+                    );
+                }
+            }
+        }
+        assert!(counted > 5_000, "{counted}");
     }
 }

@@ -23,8 +23,8 @@ pub(crate) trait Visitor<L: Leaves> {
 }
 
 /// A child to come back to, and the `t` from which on the ray is in its box: the bits of `t` above those
-/// of the child, so that entries compare as their `t` do. Negative ones come first, though not in order among
-/// themselves, which costs time where a ray has a negative range, and nothing else.
+/// of the child, so that entries compare as their `t` do. Where boxes are tested one by one it may be negative: those come
+/// first, though not in order among themselves, which costs time and nothing else.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Entry(i64);
 

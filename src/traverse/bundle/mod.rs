@@ -21,7 +21,7 @@ use crate::{
     layout::{Bvh, Child, Gather, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::bits,
     simd::{Lanes, Simd, Vector, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, most, passing},
+    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, least, most, passing},
 };
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -189,11 +189,14 @@ impl<'a, T: Simd> Bundle<'a, T> {
         let mut packets = [const { MaybeUninit::uninit() }; PACKETS];
         let nothing = V::<T>::splat(token, f32::NEG_INFINITY);
         let (mut extent, mut far) = (nothing, nothing);
+        let mut start = V::<T>::splat(token, f32::INFINITY);
         // Of the slopes and the slopes' negatives.
         let mut steepest = [[nothing; 2]; 2];
         for index in 0..count {
-            let (packet, extents) = Packet::new(token, bounds, &rays[LANES * index..], &prepared)?;
+            let (packet, extents, starts) =
+                Packet::new(token, bounds, &rays[LANES * index..], &prepared)?;
             extent = extent.max(extents);
+            start = start.min(starts);
             far = far.max(packet.far);
             let ([x, y], zero) = (packet.slope, V::<T>::splat(token, 0.0));
             let [up, down] = &mut steepest;
@@ -210,12 +213,12 @@ impl<'a, T: Simd> Bundle<'a, T> {
         for packet in &packets[..count] {
             // SAFETY: just written.
             let Packet { origin, slabs, .. } = unsafe { packet.assume_init_ref() };
-            bundling.add(token, *origin, slabs.reciprocals(), slabs.t_min());
+            bundling.add(token, *origin, slabs.reciprocals());
         }
         Some(Self {
             rays,
             axes,
-            slabs: bundling.finish(first.direction),
+            slabs: bundling.finish(first.direction, least(start)),
             packets,
             count,
             far: most(far),

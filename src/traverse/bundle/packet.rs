@@ -46,14 +46,15 @@ pub(super) struct Packet<T: Simd> {
 }
 
 impl<T: Simd> Packet<T> {
-    /// Of the first eight rays, or as many as there are, if they are like the one that is prepared; and each one's D.
+    /// Of the first eight rays, or as many as there are, if they are like the one that is prepared; each one's D, and before
+    /// which `t` it hits nothing.
     #[inline(always)]
     pub(super) fn new(
         token: T,
         bounds: &Aabb,
         rays: &[Ray],
         like: &PreparedRay,
-    ) -> Option<(Self, V<T>)> {
+    ) -> Option<(Self, V<T>, V<T>)> {
         let mut padded = [[0.0; 8]; LANES];
         let rows: &[[f32; 8]; LANES] = match rays.first_chunk::<LANES>() {
             Some(rays) => bytemuck::cast_ref(rays),
@@ -71,7 +72,9 @@ impl<T: Simd> Packet<T> {
         }
         let reciprocals = reciprocals(token, direction);
         let signs = like.ray.direction;
-        let (slabs, extent) = RaySlabs::of_lanes(token, origin, reciprocals, t_min, signs, bounds);
+        let (mut slabs, extent) =
+            RaySlabs::of_lanes(token, origin, reciprocals, t_min, signs, bounds);
+        let start = slabs.begin_at_zero(token, t_min);
         let [kx, ky, kz] = *like.axes;
         let zero = V::<T>::splat(token, 0.0);
         let packet = Self {
@@ -91,7 +94,7 @@ impl<T: Simd> Packet<T> {
             v: zero,
             places: zero,
         };
-        Some((packet, extent))
+        Some((packet, extent, start))
     }
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
