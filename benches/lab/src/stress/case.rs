@@ -1,6 +1,6 @@
 //! One case: a mesh, rays, and what besides the contract is expected of them.
 
-use super::families::Family;
+use super::{families::Family, variants::Settings};
 use fastrand::Rng;
 use wide_bvh::{build::BinaryTree, geometry::Ray};
 use wide_bvh_scenes::Mesh;
@@ -10,6 +10,8 @@ pub struct Case {
     pub mesh: Mesh,
     /// A tree for the builder to start from, besides its own.
     pub tree: BinaryTree,
+    /// For one build more.
+    pub settings: Settings,
     pub rays: Vec<Ray>,
     /// Every ray has to hit: it starts within a closed mesh.
     pub closed: bool,
@@ -35,10 +37,11 @@ impl Case {
         (family.case)(&mut rng)
     }
 
-    /// A case with a random tree, checked as most are.
+    /// A case with a random tree and settings, checked as most are.
     pub fn of(rng: &mut Rng, mesh: Mesh, rays: Vec<Ray>) -> Self {
         Self {
             tree: super::trees::random(rng, mesh.indices.len()),
+            settings: Settings::random(rng),
             mesh,
             rays,
             closed: false,

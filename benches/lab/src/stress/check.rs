@@ -4,7 +4,7 @@ use super::{
     case::{Case, Flush},
     flush::flushed,
     tally::Tally,
-    variants::{self, Mismatch, show},
+    variants::{self, Builds, Mismatch, show},
 };
 use crate::exact::{Sheared, claims, margins};
 use glam::{DVec2, DVec3, Vec3};
@@ -83,16 +83,16 @@ fn check_here(case: &Case) -> Result<Tally, Box<Violation>> {
         hits: expected.iter().flatten().count() as u64,
         ..Tally::default()
     };
-    tally.checks = variants::check(&mesh, &case.tree, &rays, &expected, flush_queries).map_err(
-        |Mismatch { ray, variant, got }| {
-            let expected = ray.map_or("a build".into(), |ray| show(expected[ray]));
-            let what = format!("{variant}: {got}\nbrute force: {expected}");
-            match ray {
-                Some(place) => violation(place, what),
-                None => violation(usize::MAX, what),
-            }
-        },
-    )?;
+    let builds = Builds::new(&case.tree, case.settings);
+    let checks = variants::check(&mesh, &builds, &rays, &expected, flush_queries);
+    tally.checks = checks.map_err(|Mismatch { ray, variant, got }| {
+        let expected = ray.map_or("a build".into(), |ray| show(expected[ray]));
+        let what = format!("{variant}: {got}\nbrute force: {expected}");
+        match ray {
+            Some(place) => violation(place, what),
+            None => violation(usize::MAX, what),
+        }
+    })?;
     // Denormals that are flushed are no part of the claims.
     if case.flush == Flush::Never {
         for place in (0..rays.len()).step_by(case.exact_every) {

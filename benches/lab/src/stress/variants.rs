@@ -1,9 +1,10 @@
 //! Every way to ask this crate, held to the same answers.
 //!
-//! Three places grow with the crate: [`BUILDS`] by the builder's presets, [`check`] by layouts and widths,
+//! Three places grow with the crate: [`Builds`] by the builder's settings, [`check`] by layouts and widths,
 //! [`ask`] by kinds of call. What is opened from bytes has to answer as what was written.
 
 use super::flush::flushed;
+use fastrand::Rng;
 use wide_bvh::{
     build::{BinaryTree, BuildError, Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
@@ -26,50 +27,69 @@ pub struct Mismatch {
     pub got: String,
 }
 
-/// How a hierarchy comes to be.
-struct Build {
-    name: &'static str,
-    builder: fn() -> Builder<'static>,
-    from_tree: bool,
+/// What the builder is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    preset: Preset,
+    /// If not the preset's.
+    splits: Option<f32>,
 }
 
-const BUILDS: [Build; 7] = [
-    Build {
-        name: "default build",
-        builder: Builder::new,
-        from_tree: false,
-    },
-    Build {
-        name: "fast",
-        builder: || Builder::new().preset(Preset::Fast),
-        from_tree: false,
-    },
-    Build {
-        name: "balanced",
-        builder: || Builder::new().preset(Preset::Balanced),
-        from_tree: false,
-    },
-    Build {
-        name: "no splits",
-        builder: || Builder::new().splits(0.0),
-        from_tree: false,
-    },
-    Build {
-        name: "many splits",
-        builder: || Builder::new().splits(4.0),
-        from_tree: false,
-    },
-    Build {
-        name: "balanced, many splits",
-        builder: || Builder::new().preset(Preset::Balanced).splits(4.0),
-        from_tree: false,
-    },
-    Build {
-        name: "from a tree",
-        builder: Builder::new,
-        from_tree: true,
-    },
-];
+impl Settings {
+    const fn of(preset: Preset) -> Self {
+        Self {
+            preset,
+            splits: None,
+        }
+    }
+
+    const fn with_splits(self, splits: f32) -> Self {
+        Self {
+            splits: Some(splits),
+            ..self
+        }
+    }
+
+    /// Any preset with any splits, from hardly any to more than are ever wanted.
+    pub fn random(rng: &mut Rng) -> Self {
+        let preset = [Preset::Fast, Preset::Balanced, Preset::Best][rng.usize(..3)];
+        Self::of(preset).with_splits(10.0_f32.powf(rng.f32() * 4.0 - 3.0))
+    }
+
+    fn builder(self) -> Builder<'static> {
+        let builder = Builder::new().preset(self.preset);
+        match self.splits {
+            Some(splits) => builder.splits(splits),
+            None => builder,
+        }
+    }
+}
+
+/// How hierarchies come to be.
+pub struct Builds<'a> {
+    /// By the builder's own trees, and what each is called.
+    own: [(String, Settings); 7],
+    /// By this one.
+    tree: &'a BinaryTree,
+}
+
+impl<'a> Builds<'a> {
+    /// Those that every case has, one with these settings, and one from this tree.
+    pub fn new(tree: &'a BinaryTree, drawn: Settings) -> Self {
+        let default = Settings::of(Preset::default());
+        let balanced = Settings::of(Preset::Balanced);
+        let own = [
+            ("default build".into(), default),
+            ("fast".into(), Settings::of(Preset::Fast)),
+            ("balanced".into(), balanced),
+            ("no splits".into(), default.with_splits(0.0)),
+            ("many splits".into(), default.with_splits(4.0)),
+            ("balanced, many splits".into(), balanced.with_splits(4.0)),
+            (format!("{drawn:?}"), drawn),
+        ];
+        Self { own, tree }
+    }
+}
 
 /// Holds every variant's answers to the `expected` ones, bit for bit; with denormals flushed to zero, in queries
 /// alone, if `flush` is set. How many were compared.
@@ -78,15 +98,17 @@ const BUILDS: [Build; 7] = [
 /// The first that differs.
 pub fn check(
     mesh: &TriangleMesh,
-    tree: &BinaryTree,
+    builds: &Builds,
     rays: &[Ray],
     expected: &[Option<Hit>],
     flush: bool,
 ) -> Result<u64, Mismatch> {
-    Ok(check_width::<Node8>(mesh, tree, rays, expected, flush, 0)?
-        + check_width::<Node4>(mesh, tree, rays, expected, flush, 1)?
-        + check_compact::<CompactNode8>(mesh, rays, expected, flush, 2)?
-        + check_compact::<CompactNode4>(mesh, rays, expected, flush, 3)?)
+    Ok(
+        check_width::<Node8>(mesh, builds, rays, expected, flush, 0)?
+            + check_width::<Node4>(mesh, builds, rays, expected, flush, 1)?
+            + check_compact::<CompactNode8>(mesh, builds, rays, expected, flush, 2)?
+            + check_compact::<CompactNode4>(mesh, builds, rays, expected, flush, 3)?,
+    )
 }
 
 /// What a ray by itself is asked, and which rays are.
@@ -118,7 +140,7 @@ impl Share {
 
 fn check_width<N: WideNode>(
     mesh: &TriangleMesh,
-    tree: &BinaryTree,
+    builds: &Builds,
     rays: &[Ray],
     expected: &[Option<Hit>],
     flush: bool,
@@ -127,11 +149,14 @@ fn check_width<N: WideNode>(
     let finite = is_finite(mesh);
     let mut checked = 0;
     let mut known: Vec<Bvh<N, TriangleLeaf, Owned>> = Vec::new();
-    for (number, build) in BUILDS.iter().enumerate() {
-        let name = format!("{}, {}-wide", build.name, N::WIDTH);
-        let builder = (build.builder)().drop_non_finite(!finite);
-        let built = if build.from_tree {
-            builder.build_from_tree_as(mesh, tree)
+    let own = builds.own.iter();
+    let own = own.map(|(name, settings)| (name.as_str(), settings.builder(), false));
+    let from_tree = [("from a tree", Builder::new(), true)];
+    for (number, (name, builder, from_tree)) in own.chain(from_tree).enumerate() {
+        let name = format!("{name}, {}-wide", N::WIDTH);
+        let builder = builder.drop_non_finite(!finite);
+        let built = if from_tree {
+            builder.build_from_tree_as(mesh, builds.tree)
         } else {
             builder.build_as(mesh)
         };
@@ -153,7 +178,7 @@ fn check_width<N: WideNode>(
                 (true, 0) => (Share::Whole, rays.len()),
                 (true, _) => (Share::Half, rays.len() / 8),
                 // Compact layouts have none of these.
-                _ if build.from_tree => (Share::Half, rays.len() / 16),
+                _ if from_tree => (Share::Half, rays.len() / 16),
                 _ => (Share::Turn(number + layout), rays.len() / 16),
             };
             let asked = [rays, &rays[..batched]];
@@ -183,6 +208,7 @@ fn check_width<N: WideNode>(
 /// Compact nodes over the mesh itself; also opened, without the mesh in the bytes and with it.
 fn check_compact<N: WideNode>(
     mesh: &TriangleMesh,
+    builds: &Builds,
     rays: &[Ray],
     expected: &[Option<Hit>],
     flush: bool,
@@ -190,10 +216,9 @@ fn check_compact<N: WideNode>(
 ) -> Result<u64, Mismatch> {
     let mut checked = 0;
     let mut known: Vec<Bvh<N, RunLeaf, Owned>> = Vec::new();
-    let builds = BUILDS.iter().filter(|build| !build.from_tree);
-    for (number, build) in builds.enumerate() {
-        let name = format!("{}, {}-wide, compact", build.name, N::WIDTH);
-        let builder = (build.builder)().drop_non_finite(!is_finite(mesh));
+    for (number, (name, settings)) in builds.own.iter().enumerate() {
+        let name = format!("{name}, {}-wide, compact", N::WIDTH);
+        let builder = settings.builder().drop_non_finite(!is_finite(mesh));
         let tree = builder.build_compact::<N>(mesh);
         let tree = tree.map_err(|error| no_build(&name, error))?;
         if known.iter().any(|other| same_runs(&tree, other)) {
