@@ -8,7 +8,8 @@ use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Aabb, Hit, Ray, TriangleMesh},
     layout::{
-        Borrowed, Bvh, LayoutError, Node4, Node8, Owned, PrimitiveLeaf, TriangleLeaf, WideNode,
+        Borrowed, Bvh, CompactBvh8, LayoutError, Node4, Node8, Owned, PrimitiveLeaf, TriangleLeaf,
+        WideNode,
     },
     primitive::Cuboids,
     reference,
@@ -167,6 +168,25 @@ fn bundles_and_batches() {
             assert_occluded(&occluded, truth);
         }
     });
+}
+
+/// Compact nodes, and leaves that are read where the mesh has them: by themselves, and brought together for a bundle.
+#[test]
+fn over_a_mesh() {
+    let Scene { rays, truth, .. } = &*SCENE;
+    let mesh = mesh();
+    let mesh = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+    let builder = Builder::new().preset(Preset::Fast);
+    let compact: CompactBvh8 = builder.build_compact(&mesh).unwrap();
+    let bvh = compact.over(&mesh).unwrap();
+    for (ray, &hit) in rays.iter().zip(truth) {
+        assert_eq!(bvh.closest_hit(ray), hit);
+    }
+    let (mut hits, mut occluded) = ([None; 9], [false; 9]);
+    bvh.closest_hits(&rays[..9], &mut hits);
+    bvh.any_hits(&rays[..9], &mut occluded);
+    assert_eq!(hits, truth[..9]);
+    assert_occluded(&occluded, truth);
 }
 
 #[test]
