@@ -15,8 +15,8 @@
 //! max(near, t_min - S(t_min)) <= min(far, t_max + S(t_max)),  S(t) = u·D·|r.z| + K_RELATIVE·u·|t|
 //! ```
 //!
-//! with z the axis of the largest direction component; but no t is taken to begin before 0, which is seen to in (7). Let M be the largest |vertex - o| of a triangle on
-//! any axis: M <= D(1 + u).
+//! with z the axis of the largest direction component; but the left side is no less than 0, which is seen to in (7).
+//! Let M be the largest |vertex - o| of a triangle on any axis: M <= D(1 + u).
 //!
 //! *(1) An accepted triangle has a point near the ray.* The edge functions have exact signs, so the triangle,
 //! sheared *as computed*, holds 0: weights w >= 0 of sum 1 exist with Σ w·x' = 0 and Σ w·y' = 0 exactly. A

@@ -218,7 +218,7 @@ mod tests {
         [-1e-5, 1e-5].map(|more| boxes.iter().filter(|aabb| passed(aabb, more)).count() as u32)
     }
 
-    /// No more boxes than there are are passed, wherever the range begins: not those behind the ray either.
+    /// Wherever the range begins, no box is passed that is outside it: none behind the ray, either.
     #[test]
     fn boxes_are_passed_within_ranges_of_any_sign() {
         let mut rng = Rng::with_seed(7);
