@@ -69,7 +69,8 @@
 //!
 //! *(7) t begins at 0 or later.* The greater and the lesser of two numbers are found by their bits, as integers, where
 //! that is sooner: as it should be, but for two negative ones, of which it may be either. So the left side of the test is
-//! never negative, and the right side is just when it should be.
+//! never negative, and the right side is just when it should be. (Boxes that are tested one by one are compared as floats:
+//! there t begins where it does.)
 //!
 //! - If t_min >= 0, the left side is the greater of 0 and what it was. Then t* may be left of 0, by no more than
 //!   S(0) = u·D·|r.z|, and far has to be 0 at least: |r.z| is the least of |r|, (3) needs 1 of the 3 u·D·|r| that are left
