@@ -121,7 +121,7 @@ impl<R: Triangles> Triangles for ApproximateRef<R> {
         ray: &RayShear,
         look: Look<R::Lanes<S>>,
         t_max: f32,
-    ) -> Option<TriangleHits<R::Lanes<S>>> {
+    ) -> TriangleHits<R::Lanes<S>> {
         self.0.finish::<S, P, NEED_T>(token, ray, look, t_max)
     }
 

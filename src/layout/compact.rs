@@ -369,10 +369,9 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
     /// # Safety
     /// There is such a lane.
     #[inline(always)]
-    unsafe fn link_among<V: Vector<W>>(&self, links: V, lane: usize) -> Link {
-        let links = links.to_array();
+    unsafe fn link_among<'a>(&'a self, links: &'a [f32; W], lane: usize) -> &'a Link {
         // SAFETY: the caller's promise: there are `W` lanes.
-        Link::from_bits(unsafe { links.get_unchecked(lane) }.to_bits())
+        bytemuck::cast_ref(unsafe { links.get_unchecked(lane) })
     }
 
     #[inline(always)]

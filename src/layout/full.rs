@@ -118,9 +118,9 @@ impl<const W: usize, A> Node<W, A> {
     /// # Safety
     /// There is such a lane.
     #[inline(always)]
-    unsafe fn link_among<V: Vector<W>>(&self, _: V, lane: usize) -> Link {
+    unsafe fn link_among<'a>(&'a self, _: &'a [f32; W], lane: usize) -> &'a Link {
         // SAFETY: the caller's promise.
-        unsafe { self.link(lane) }
+        unsafe { self.links.get_unchecked(lane) }
     }
 
     #[inline(always)]

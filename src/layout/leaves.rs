@@ -155,7 +155,7 @@ pub trait Triangles: Copy {
         ray: &RayShear,
         look: Look<Self::Lanes<S>>,
         t_max: f32,
-    ) -> Option<TriangleHits<Self::Lanes<S>>>;
+    ) -> TriangleHits<Self::Lanes<S>>;
 
     /// A bit for each triangle there is.
     #[inline(always)]
@@ -173,17 +173,20 @@ pub trait Triangles: Copy {
     #[inline(always)]
     fn is_hit<S: Simd>(self, token: S, ray: &RayShear, t_max: f32) -> bool {
         if !S::IN_FOURS {
-            return self.test::<S, false>(token, ray, t_max).is_some();
+            let hits = self.test::<S, false>(token, ray, t_max);
+            return hits.is_some_and(|hits| hits.mask != 0);
         }
         for four in self.fours() {
-            if four.test::<S, false>(token, ray, t_max).is_some() {
+            let hits = four.test::<S, false>(token, ray, t_max);
+            if hits.is_some_and(|hits| hits.mask != 0) {
                 return true;
             }
         }
         false
     }
 
-    /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit.
+    /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit. `None` if
+    /// none is as soon as the first look shows.
     #[inline(always)]
     fn test<S: Simd, const NEED_T: bool>(
         self,
@@ -195,7 +198,7 @@ pub trait Triangles: Copy {
         if !look.may_hit() {
             return None;
         }
-        self.hits::<S, NEED_T>(token, ray, look, t_max)
+        Some(self.hits::<S, NEED_T>(token, ray, look, t_max))
     }
 
     /// The rest of the test.
@@ -206,7 +209,7 @@ pub trait Triangles: Copy {
         ray: &RayShear,
         look: Look<Self::Lanes<S>>,
         t_max: f32,
-    ) -> Option<TriangleHits<Self::Lanes<S>>> {
+    ) -> TriangleHits<Self::Lanes<S>> {
         self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max)
     }
 }
@@ -237,7 +240,7 @@ macro_rules! in_lanes {
             ray: &RayShear,
             look: Look<S::$vector>,
             t_max: f32,
-        ) -> Option<$crate::primitive::triangle::TriangleHits<S::$vector>> {
+        ) -> $crate::primitive::triangle::TriangleHits<S::$vector> {
             let pairs = $crate::layout::leaves::OneRay(self, ray);
             look.finish::<$lanes, NEED_T, P, _>(token, ray, t_max, pairs)
         }

@@ -83,12 +83,16 @@ pub trait WideNode: Pod + sealed::Sealed {
     unsafe fn link(&self, lane: usize) -> Link;
     #[doc(hidden)]
     fn link_lanes<S: Simd>(&self, token: S) -> Self::Lanes<S>;
-    /// Where a lane leads to, `links` being where all do: without a branch.
+    /// Where it is written where a lane leads to, `links` being where all do.
     ///
     /// # Safety
     /// There is such a lane.
     #[doc(hidden)]
-    unsafe fn link_among<S: Simd>(&self, links: Self::Lanes<S>, lane: usize) -> Link;
+    unsafe fn link_among<'a, S: Simd>(
+        &'a self,
+        links: &'a <Self::Lanes<S> as Lanes>::Array,
+        lane: usize,
+    ) -> &'a Link;
     /// By how much the greatest `t` is to be raised for [`test`](Self::test).
     #[doc(hidden)]
     fn margin<S: Simd>(slabs: &Self::Slabs<S>) -> f32;
@@ -224,7 +228,11 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            unsafe fn link_among<S: Simd>(&self, links: S::$vector, lane: usize) -> Link {
+            unsafe fn link_among<'a, S: Simd>(
+                &'a self,
+                links: &'a [f32; $width],
+                lane: usize,
+            ) -> &'a Link {
                 // SAFETY: the caller's promise.
                 unsafe { self.link_among(links, lane) }
             }

@@ -158,7 +158,7 @@ impl<V> Look<V> {
         ray: &RayShear,
         t_max: f32,
         pairs: O,
-    ) -> Option<TriangleHits<V>>
+    ) -> TriangleHits<V>
     where
         V: Vector<N>,
     {
@@ -209,7 +209,7 @@ impl<V: Copy + Sub<Output = V> + Mul<Output = V>> Sheared<V> {
 
 /// What a ray found among `N` triangles.
 pub struct TriangleHits<V> {
-    /// Which triangles are hit, a bit each. The other fields are meaningful in these lanes alone.
+    /// Which triangles are hit, a bit each, if any. The other fields are meaningful in these lanes alone.
     pub mask: u32,
     pub t: V,
     pub u: V,
@@ -330,8 +330,8 @@ impl RayShear<'_> {
         if !look.may_hit() {
             return None;
         }
-        let hit = look.finish::<1, true, P, _>(token, self, t_max, self.pair(triangle))?;
-        Some([hit.t.0, hit.u.0, hit.v.0])
+        let hit = look.finish::<1, true, P, _>(token, self, t_max, self.pair(triangle));
+        (hit.mask != 0).then_some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
 
@@ -346,7 +346,7 @@ impl<V> Along<V> {
         edges: Edges<V>,
         t_max: V,
         pairs: O,
-    ) -> Option<TriangleHits<V>>
+    ) -> TriangleHits<V>
     where
         V: Vector<N>,
     {
@@ -362,9 +362,6 @@ impl<V> Along<V> {
         let reciprocal = self.reciprocal;
         let last = (az * reciprocal).max(bz * reciprocal).max(cz * reciprocal);
         let candidates = candidates & self.t_min.le(last).bits();
-        if candidates == 0 {
-            return None;
-        }
         let determinant = wa + wb + wc;
         let size = determinant.abs();
         let finite = size.lt(V::splat(token, MAX_DETERMINANT));
@@ -404,7 +401,7 @@ impl<V> Along<V> {
             let inside = sound & t_min.le(least_t) & most_t.le(t_max) & most_t.abs().lt(infinity);
             let mask = candidates & inside.bits();
             if mask != 0 {
-                return Some(TriangleHits { mask, t, u, v });
+                return TriangleHits { mask, t, u, v };
             }
         }
         if mask != candidates {
@@ -451,19 +448,18 @@ impl<V> Along<V> {
         mask: u32,
         [t, u, v]: [V; 3],
         t_max: V,
-    ) -> Option<TriangleHits<V>>
+    ) -> TriangleHits<V>
     where
         V: Vector<N>,
     {
         let (zero, infinity) = (V::splat(token, 0.0), V::splat(token, f32::INFINITY));
         let in_range = self.t_min.le(t) & t.le(t_max) & t.abs().lt(infinity);
-        let mask = mask & in_range.bits();
-        (mask != 0).then_some(TriangleHits {
-            mask,
+        TriangleHits {
+            mask: mask & in_range.bits(),
             t,
             u: u + zero,
             v: v + zero,
-        })
+        }
     }
 }
 

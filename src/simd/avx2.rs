@@ -117,7 +117,7 @@ macro_rules! impl_vector {
             }
             #[inline(always)]
             unsafe fn compress(self, mask: u32, to: *mut f32) {
-                let lanes = &COMPRESSED[mask as usize % (1 << $n)];
+                let lanes = COMPRESSED[mask as usize % (1 << $n)];
                 unsafe { $store(to, $permute(self.0, lanes.first_chunk().unwrap_unchecked())) };
             }
         }
@@ -249,7 +249,9 @@ impl_vector!(
 );
 
 /// For a mask of lanes, their numbers in order.
-static COMPRESSED: [[u8; 8]; 256] = {
+//
+// Not a static: another crate's code would look its address up first.
+const COMPRESSED: &[[u8; 8]; 256] = &{
     let mut table = [[0; 8]; 256];
     let mut mask = 0;
     while mask < 256 {

@@ -1,9 +1,11 @@
 //! Many rays at once, a step at a time in turn.
 //!
 //! A ray alone waits: for its node to be loaded, for the boxes to be tested, for what was guessed wrong. Here some are under
-//! way together, and one's wait is another's work. What follows from a step is not branched on, for it cannot be guessed:
-//! a node's children are written to the ray's stack by a permutation, and the ray goes to the list of those at a node,
-//! at a leaf, at a leaf whose triangles need a closer look, or at their end.
+//! way together, and one's wait is another's work. What follows from a step is hardly branched on, for it cannot be guessed:
+//! a node's children are written to the ray's stack by a permutation, the nearest hit is kept by selection, and the ray goes
+//! to the list of those at a node, at a leaf or at their end. A step at a node is in three parts, of which each is done for
+//! another ray than the one before it: a processor sees a few hundred instructions ahead, and one ray's step from its node's
+//! place to the next one's is longer than that allows to hide.
 //!
 //! Children on the stack are in the order of lanes, but for the nearest, which comes next.
 //!
@@ -14,9 +16,9 @@
 use super::{feed::Feed, query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
-    layout::{Bvh, Leaves, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
-    primitive::triangle::{Look, RayShear},
-    simd::{Lanes, Simd},
+    layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
+    primitive::triangle::RayShear,
+    simd::{Lanes, Simd, Vector},
     slab::{NarrowRay, reach_of},
 };
 use core::{hint::select_unpredictable, mem::MaybeUninit, ptr};
@@ -27,8 +29,14 @@ pub(super) const MOST_LANES: usize = 64;
 /// A stack's places: [`BOTTOM`], the entries, and room to write a whole vector above the last.
 const PLACES: usize = STACK + 16;
 
-/// What lies below all entries of a stack. It counts as a leaf.
-const BOTTOM: Link = Link::from_bits(u32::MAX);
+/// What lies below all entries of a stack. It counts as a leaf, and is one that may be fetched in vain.
+const BOTTOM: Link = Link::leaf_at(0);
+
+/// The place of the stack's last entry once the bottom has been taken.
+const ENDED: u32 = u32::MAX;
+
+/// As many of a stack's entries are looked at together.
+const FEW: usize = 8;
 
 /// Over more primitives than this, of leaves that say where to read on that is fetched, too. Smaller scenes are in the
 /// caches.
@@ -53,8 +61,12 @@ pub(super) struct Lane {
     index: usize,
 }
 
-/// What a first look at a leaf has brought.
-type LookAt<'a, T, L> = Look<<<L as Leaves>::Ref<'a> as Triangles>::Lanes<T>>;
+/// A node whose boxes have been tested.
+struct Tested<'a, T: Simd, N: WideNode> {
+    node: &'a N,
+    hit: N::Lanes<T>,
+    near: N::Lanes<T>,
+}
 
 /// Traces all rays of `feed`, on `lanes`.
 #[inline(always)]
@@ -75,14 +87,21 @@ pub(super) fn trace<
     // Lengths apart from what they are of, and both from all else, so that they stay in registers.
     let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
     let (mut nodes, mut rest) = (0, 0);
-    // What comes after nodes: leaves, those of them with candidates, and ends.
-    let (mut at_leaf, mut at_triangles, mut at_end) = (List::EMPTY, List::EMPTY, List::EMPTY);
-    // Apart, so that lists are short and what they are of is together.
-    let mut looks = [const { MaybeUninit::<LookAt<T, L>>::uninit() }; LANES];
+    // What comes after nodes.
+    let (mut at_leaf, mut at_end) = (List::EMPTY, List::EMPTY);
     let is_large = bvh.primitives().len() > LARGE;
+    if bvh.root() == Child::EMPTY {
+        while let Some((index, ..)) = feed.next() {
+            feed.answer(index, None);
+        }
+        return;
+    }
     let root = Link::new::<N>(bvh.root());
-    for (lane, state) in lanes.iter_mut().enumerate() {
-        let started = Lane::start(state, root, feed);
+    for lane in lanes.iter_mut().map(MaybeUninit::as_mut_ptr) {
+        // SAFETY: `lane` is one of them.
+        unsafe { Lane::clear(lane) };
+        // SAFETY: the same.
+        let started = unsafe { Lane::start(lane, root, feed) };
         let leaf = root.is_leaf();
         at_node.push_if(&mut nodes, lane, started & !leaf);
         at_rest.push_if(&mut rest, lane, started & leaf);
@@ -93,58 +112,53 @@ pub(super) fn trace<
             if nodes == 0 {
                 return;
             }
-            for place in 0..take(&mut nodes) {
+            let count = take(&mut nodes);
+            // For there to be one ahead of the last.
+            at_node.0[count] = at_node.get(count - 1);
+            let mut tested = in_list(at_node.get(0)).test_boxes(token, bvh);
+            let mut before = root;
+            for place in 0..count {
                 let lane = at_node.get(place);
-                let state = in_list(lanes, lane);
-                state.test_node::<T, N, L, S, Q>(token, bvh);
-                let leaf = state.current.is_leaf();
+                let ahead = in_list(at_node.get(place + 1)).test_boxes(token, bvh);
+                let state = in_list(lane);
+                state.take_children::<T, N, Q>(token, &tested);
+                fetch(token, bvh, before);
+                (tested, before) = (ahead, state.current);
+                let leaf = before.is_leaf();
                 at_node.push_if(&mut nodes, lane, !leaf);
                 at_rest.push_if(&mut rest, lane, leaf);
             }
+            fetch(token, bvh, before);
             continue;
         }
-        let (mut leaves, mut triangles, mut ends) = (0, 0, 0);
+        let (mut leaves, mut ends) = (0, 0);
         for place in 0..take(&mut rest) {
             let lane = at_rest.get(place);
-            let end = in_list(lanes, lane).current == BOTTOM;
+            let end = in_list(lane).top == ENDED;
             at_leaf.push_if(&mut leaves, lane, !end);
             at_end.push_if(&mut ends, lane, end);
         }
         if is_large {
             for place in 0..leaves {
-                let leaf = in_list(lanes, at_leaf.get(place)).current.leaf();
+                let leaf = in_list(at_leaf.get(place)).current.leaf();
                 // SAFETY: the layout's check saw that all leaves led to are there.
                 unsafe { bvh.fetch_next(token, leaf) };
             }
         }
         for place in 0..leaves {
             let lane = at_leaf.get(place);
-            // SAFETY: no more lanes are in a list than there are.
-            let look = unsafe { looks.get_unchecked_mut(triangles) };
-            let state = in_list(lanes, lane);
-            let stays = state.look_at_leaf(token, bvh, look);
-            let leaf = state.current.is_leaf();
-            at_triangles.push_if(&mut triangles, lane, stays);
-            at_node.push_if(&mut nodes, lane, !leaf);
-            at_rest.push_if(&mut rest, lane, leaf & !stays);
-        }
-        for place in 0..triangles {
-            let lane = at_triangles.get(place);
-            // SAFETY: written when the lane came to this place of the list.
-            let look = unsafe { looks.get_unchecked(place).assume_init_ref() };
-            let state = in_list(lanes, lane);
-            state.test_triangles::<T, N, L, S, Q>(token, bvh, look);
+            let state = in_list(lane);
+            state.test_leaf::<T, N, L, S, Q>(token, bvh);
             let leaf = state.current.is_leaf();
             at_node.push_if(&mut nodes, lane, !leaf);
             at_rest.push_if(&mut rest, lane, leaf);
         }
         for place in 0..ends {
             let lane = at_end.get(place);
-            let state = in_list(lanes, lane);
+            let state = in_list(lane);
             feed.answer(state.index, state.found);
-            // SAFETY: `lane` is one of them.
-            let state = unsafe { lanes.get_unchecked_mut(lane) };
-            let started = Lane::start(state, root, feed);
+            // SAFETY: it is one of them.
+            let started = unsafe { Lane::start(lane, root, feed) };
             let leaf = root.is_leaf();
             at_node.push_if(&mut nodes, lane, started & !leaf);
             at_rest.push_if(&mut rest, lane, started & leaf);
@@ -154,23 +168,58 @@ pub(super) fn trace<
 
 /// A lane that is in a list.
 #[inline(always)]
-fn in_list<const LANES: usize>(lanes: &mut [MaybeUninit<Lane>; LANES], lane: usize) -> &mut Lane {
-    // SAFETY: lists have numbers of lanes in which `start` has put a ray.
-    unsafe { lanes.get_unchecked_mut(lane).assume_init_mut() }
+fn in_list<'a>(lane: *mut Lane) -> &'a mut Lane {
+    // SAFETY: lists have lanes in which `start` has put a ray, and no other reference to one is used after this is made.
+    unsafe { &mut *lane }
+}
+
+/// Has what is next for a ray fetched, or anything if it has ended.
+#[inline(always)]
+fn fetch<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
+    token: T,
+    bvh: &Bvh<N, L, S>,
+    next: Link,
+) {
+    // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
+    // 32 bits hold.
+    let nodes = bvh.nodes().as_ptr();
+    let node = nodes.wrapping_byte_add(next.node_offset()).addr();
+    let leaf = bvh.leaf_address(next.leaf()).addr();
+    let is_leaf = 0usize.wrapping_sub(usize::from(next.is_leaf()));
+    token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
 }
 
 impl Lane {
-    /// Puts the next ray into a lane. Whether there is one. Stacks stay as they are but for the bottom.
+    /// Writes as much of a lane's stacks as is read whether it is in use or not.
+    ///
+    /// # Safety
+    /// `lane` may be written.
     #[inline(always)]
-    fn start<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
-        lane: &mut MaybeUninit<Self>,
+    unsafe fn clear(lane: *mut Self) {
+        // SAFETY: fields of memory that is there.
+        unsafe {
+            (&raw mut (*lane).links)
+                .cast::<[Link; 1 + FEW]>()
+                .write([BOTTOM; 1 + FEW]);
+            (&raw mut (*lane).nears)
+                .cast::<[f32; 1 + FEW]>()
+                .write([0.0; 1 + FEW]);
+        }
+    }
+
+    /// Puts the next ray into a lane. Whether there is one. Stacks stay as they are: the bottom is never written over.
+    ///
+    /// # Safety
+    /// `lane` may be written, and was cleared.
+    #[inline(always)]
+    unsafe fn start<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+        lane: *mut Self,
         root: Link,
         feed: &mut Feed<N, L, S, Q>,
     ) -> bool {
         let Some((index, ray, narrow)) = feed.next() else {
             return false;
         };
-        let lane = lane.as_mut_ptr();
         // SAFETY: fields of memory that is there; no more of the stacks is read than was written.
         unsafe {
             (&raw mut (*lane).narrow).write(*narrow);
@@ -178,7 +227,6 @@ impl Lane {
             (&raw mut (*lane).top).write(0);
             (&raw mut (*lane).far).write(reach_of(ray.t_max, narrow.margin()));
             (&raw mut (*lane).t_max).write(ray.t_max);
-            (&raw mut (*lane).links[0]).write(MaybeUninit::new(BOTTOM));
             (&raw mut (*lane).ray).write(*ray);
             (&raw mut (*lane).found).write(None);
             (&raw mut (*lane).index).write(index);
@@ -186,94 +234,77 @@ impl Lane {
         true
     }
 
-    /// Tests the node's boxes, and goes on to the nearest child or else to the stack's last entry.
+    /// Tests the node's boxes.
     #[inline(always)]
-    fn test_node<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
-        &mut self,
+    fn test_boxes<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
+        &self,
         token: T,
-        bvh: &Bvh<N, L, S>,
-    ) {
-        let nodes = bvh.nodes().as_ptr();
+        bvh: &'a Bvh<N, L, S>,
+    ) -> Tested<'a, T, N> {
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { bvh.node(self.current) };
         let slabs = N::widen(token, &self.narrow);
         let far = N::Lanes::<T>::splat(token, self.far);
         let (hit, near) = node.test_lanes(token, &slabs, far);
+        Tested { node, hit, near }
+    }
+
+    /// Goes on from the node to the nearest child or else to the stack's last entry.
+    #[inline(always)]
+    fn take_children<T: Simd, N: WideNode, Q: Query>(
+        &mut self,
+        token: T,
+        &Tested { node, hit, near }: &Tested<T, N>,
+    ) {
         let mask = hit.bits();
         let links = node.link_lanes(token);
         // Read once: it might be in what is written below, for all that the compiler sees.
         let top = self.top as usize;
         let above = top + 1;
+        // The nearest; or the first, which is the largest.
+        let child = if Q::CLOSEST {
+            near.least(hit)
+        } else {
+            mask.trailing_zeros() as usize
+        };
+        let child = child % N::WIDTH;
+        let others = mask & !(1 << child);
+        let array = links.to_array();
         // SAFETY: the layout's check saw that a walk never leaves more than `STACK` children behind, which `top` is at
         // most, and a vector's worth of places is above them. `top` and those below were written. `child` is a lane.
         unsafe {
-            let last = self.links.get_unchecked(top).assume_init();
-            let above_links = self.links.as_mut_ptr().add(above).cast();
-            // The nearest; or the first, which is the largest.
-            let child = if Q::CLOSEST {
-                near.least(hit)
-            } else {
-                mask.trailing_zeros() as usize % N::WIDTH
-            };
-            let others = mask & !(1 << child);
-            links.compress(others, above_links);
+            links.compress(others, self.links.as_mut_ptr().add(above).cast());
             if Q::CLOSEST {
                 near.compress(others, self.nears.as_mut_ptr().add(above).cast());
             }
-            let child = node.link_among(links, child % N::WIDTH);
-            self.current = select_unpredictable(mask != 0, child, last);
+            // Where it is read is chosen, since a choice of what was read may become a branch.
+            let last = self.links.get_unchecked(top).assume_init_ref();
+            let child = node.link_among(&array, child);
+            self.current = *select_unpredictable(mask != 0, child, last);
         }
         self.top = (top as u32 + mask.count_ones()).wrapping_sub(1);
-
-        // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
-        // 32 bits hold.
-        let node = nodes.wrapping_byte_add(self.current.node_offset()).addr();
-        // Below the bottom there is no leaf, and to ask for what is nowhere near costs a walk through the page tables.
-        let place = select_unpredictable(self.current == BOTTOM, 0, self.current.leaf());
-        let leaf = bvh.leaf_address(place).addr();
-        let is_leaf = 0usize.wrapping_sub(usize::from(self.current.is_leaf()));
-        token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
-    }
-
-    /// Whether the leaf has triangles that may be hit. If not, goes on to the stack's last entry.
-    #[inline(always)]
-    fn look_at_leaf<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
-        &mut self,
-        token: T,
-        bvh: &'a Bvh<N, L, S>,
-        look: &mut MaybeUninit<LookAt<'a, T, L>>,
-    ) -> bool {
-        let look = look.write(self.leaf(bvh).look(token, &self.shear()));
-        let stays = look.may_hit();
-        // SAFETY: `top` and those below were written.
-        let last = unsafe { self.links.get_unchecked(self.top as usize).assume_init() };
-        self.current = select_unpredictable(stays, self.current, last);
-        self.top = self.top.wrapping_sub(u32::from(!stays));
-        stays
     }
 
     /// Tests the leaf's triangles, and goes on to the stack's last entry, or the end if enough is known.
     #[inline(always)]
-    fn test_triangles<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+    fn test_leaf<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
         token: T,
-        bvh: &'a Bvh<N, L, S>,
-        &look: &LookAt<'a, T, L>,
+        bvh: &Bvh<N, L, S>,
     ) {
-        let (leaf, shear, t_max) = (self.leaf(bvh), self.shear(), self.t_max);
+        // SAFETY: the layout's check saw that all leaves led to are there.
+        let leaf = unsafe { bvh.leaf(self.current.leaf()) };
+        let shear = RayShear::of(&self.ray, self.narrow.axes(), self.narrow.along());
         if Q::CLOSEST {
-            let hits = leaf.hits::<T, true>(token, &shear, look, t_max);
-            if let Some(hits) = hits {
-                let primitives = bvh.primitives();
+            if let Some(hits) = leaf.test::<T, true>(token, &shear, self.t_max) {
                 let best = &mut self.found;
-                if Found::choose(best, &mut self.t_max, leaf, hits, primitives) {
-                    self.far = reach_of(self.t_max, self.narrow.margin());
-                    self.forget_the_far();
-                }
+                Found::choose_unbranched(best, &mut self.t_max, leaf, hits, bvh.primitives());
+                self.far = reach_of(self.t_max, self.narrow.margin());
+                self.forget_the_far(token);
             }
-        } else if (leaf.hits::<T, false>(token, &shear, look, t_max)).is_some() {
+        } else if leaf.is_hit(token, &shear, self.t_max) {
             self.found = Some(Found::default());
-            self.current = BOTTOM;
+            (self.current, self.top) = (BOTTOM, ENDED);
             return;
         }
         // SAFETY: `top` and those below were written.
@@ -283,9 +314,24 @@ impl Lane {
 
     /// Takes from the stack what is too far now.
     #[inline(always)]
-    fn forget_the_far(&mut self) {
-        let mut kept = 0;
-        for place in 1..=self.top as usize {
+    fn forget_the_far<T: Simd>(&mut self, token: T) {
+        let few = self.top.min(FEW as u32);
+        // SAFETY: as many were written when the lane was cleared, and each time with all that is written after.
+        let (nears, links): (&[f32; FEW], &[f32; FEW]) = unsafe {
+            (
+                &*self.nears.as_ptr().add(1).cast(),
+                &*self.links.as_ptr().add(1).cast(),
+            )
+        };
+        let (nears, links) = (T::F32x8::load(token, nears), T::F32x8::load(token, links));
+        let near = nears.le(T::F32x8::splat(token, self.far)).bits() & !(u32::MAX << few);
+        // SAFETY: there is room for a vector.
+        unsafe {
+            nears.compress(near, self.nears.as_mut_ptr().add(1).cast());
+            links.compress(near, self.links.as_mut_ptr().add(1).cast());
+        }
+        let mut kept = near.count_ones() as usize;
+        for place in FEW + 1..=self.top as usize {
             // SAFETY: `top` and those below were written; `kept + 1` is at most `place`.
             unsafe {
                 let near = self.nears.get_unchecked(place).assume_init();
@@ -296,39 +342,25 @@ impl Lane {
         }
         self.top = kept as u32;
     }
-
-    #[inline(always)]
-    fn leaf<'a, N: WideNode, L: TriangleLeaves, S: Storage>(
-        &self,
-        bvh: &'a Bvh<N, L, S>,
-    ) -> L::Ref<'a> {
-        // SAFETY: the layout's check saw that all leaves led to are there.
-        unsafe { bvh.leaf(self.current.leaf()) }
-    }
-
-    #[inline(always)]
-    fn shear(&self) -> RayShear<'_> {
-        RayShear::of(&self.ray, self.narrow.axes(), self.narrow.along())
-    }
 }
 
 /// Lanes that are to do the same next. How many is known apart.
-struct List([u8; MOST_LANES + 1]);
+struct List([*mut Lane; MOST_LANES + 1]);
 
 impl List {
-    const EMPTY: Self = Self([0; MOST_LANES + 1]);
+    const EMPTY: Self = Self([ptr::null_mut(); MOST_LANES + 1]);
 
     #[inline(always)]
-    fn get(&self, place: usize) -> usize {
-        // SAFETY: `place` was below the length, which is at most the number of lanes.
-        usize::from(unsafe { *self.0.get_unchecked(place) })
+    fn get(&self, place: usize) -> *mut Lane {
+        // SAFETY: `place` is at most the length, which is at most the number of lanes.
+        unsafe { *self.0.get_unchecked(place) }
     }
 
     /// Written always, kept or not: no branch.
     #[inline(always)]
-    fn push_if(&mut self, len: &mut usize, lane: usize, wanted: bool) {
+    fn push_if(&mut self, len: &mut usize, lane: *mut Lane, wanted: bool) {
         // SAFETY: a lane is in a list once at most, so `len` is at most `MOST_LANES`.
-        unsafe { *self.0.get_unchecked_mut(*len) = lane as u8 };
+        unsafe { *self.0.get_unchecked_mut(*len) = lane };
         *len += usize::from(wanted);
     }
 }

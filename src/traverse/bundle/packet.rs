@@ -148,9 +148,9 @@ impl<T: Simd> Packet<T> {
                     let hits = (self.along).test::<LANES, false, G::Precision, _>(
                         token, corners, edges, self.t_max, pairs,
                     );
-                    let Some(hits) = hits else {
+                    if hits.mask == 0 {
                         break;
-                    };
+                    }
                     new |= hits.mask;
                     lanes &= !hits.mask;
                     edges.candidates &= !hits.mask;
@@ -162,9 +162,6 @@ impl<T: Simd> Packet<T> {
             }
             let hits = (self.along)
                 .test::<LANES, true, G::Precision, _>(token, corners, edges, self.t_max, pairs);
-            let Some(hits) = hits else {
-                continue;
-            };
             let nearer = hits.t.lt(self.t_max).bits() | !found;
             let mut closer = hits.mask & nearer;
             for lane in bits(hits.mask & !nearer) {
