@@ -13,7 +13,7 @@ use crate::{
     slab::{BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane, pow2},
 };
 use bytemuck::{Pod, Zeroable};
-use core::fmt::Debug;
+use core::{fmt::Debug, mem::offset_of};
 use glam::Vec3;
 
 /// `W` children, first those that are nodes, side by side in memory, then those that are leaves, whose primitives are
@@ -268,6 +268,7 @@ fn leaf(first: u32, start: u32, end: u32) -> Link {
 impl<const W: usize, H: Head> CompactNode<W, H> {
     const ORDERED: bool = true;
     const PLACES: usize = H::PLACES;
+    const LINKS: usize = offset_of!(Self, head);
 
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let (mut aabbs, mut counts, mut len) = ([Aabb::EMPTY; W], [0; W], 0);

@@ -7,6 +7,7 @@ use crate::{
     slab::{BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane},
 };
 use bytemuck::{Pod, Zeroable};
+use core::mem::offset_of;
 use glam::Vec3;
 
 /// `W` children: the planes of their boxes by axis, side and child, then where they lie. Empty lanes come
@@ -42,6 +43,7 @@ impl_wide_node!(Node8, 2, 8, F32x8, 224);
 impl<const W: usize, A> Node<W, A> {
     const ORDERED: bool = false;
     const PLACES: usize = Link::PLACES;
+    const LINKS: usize = offset_of!(Self, links);
 
     fn new(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
         let mut node = Self {

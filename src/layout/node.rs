@@ -3,7 +3,7 @@
 use super::{Child, Link};
 use crate::{
     geometry::Aabb,
-    simd::{Lanes, Simd},
+    simd::{Lanes, PREFETCHED, Simd},
     slab::{BundleSlabs, NarrowRay, Passing, RaySlabs},
 };
 use bytemuck::Pod;
@@ -23,12 +23,24 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// How many nodes, or leaves or what is counted of them, its links tell apart.
     #[doc(hidden)]
     const PLACES: usize;
+    /// How many bytes after a node's first its links are, or what they follow from.
+    #[doc(hidden)]
+    const LINKS: usize;
     /// The ray in this node's terms, in a backend's vectors.
     #[doc(hidden)]
     type Slabs<S: Simd>: Copy;
     /// A float a child, in a backend's vector.
     #[doc(hidden)]
     type Lanes<S: Simd>: Lanes<Token = S>;
+
+    /// Has the links of the node at `address` fetched, if [`prefetch`](Simd::prefetch) leaves them out. Any address will do.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn prefetch_links<S: Simd>(token: S, address: *const u8) {
+        if Self::LINKS >= PREFETCHED {
+            token.prefetch_line(address.wrapping_add(Self::LINKS));
+        }
+    }
 
     /// A node of up to [`WIDTH`](Self::WIDTH) children with their bounds, in the lanes' order; more are
     /// left out.
@@ -120,6 +132,7 @@ pub(super) mod sealed {
 
 /// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes, `$kind` in headers, that can
 /// - be made of children, say whether only of ordered ones, and of how many in all: `new`, `ORDERED`, `PLACES`;
+/// - say where its links begin: `LINKS`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
@@ -142,6 +155,7 @@ macro_rules! impl_wide_node {
             const KIND: u32 = $kind;
             const NODES_FIRST: bool = Self::ORDERED;
             const PLACES: usize = Self::PLACES;
+            const LINKS: usize = Self::LINKS;
             type Slabs<S: Simd> = RaySlabs<$width, S::$vector>;
             type Lanes<S: Simd> = S::$vector;
 

@@ -7,6 +7,9 @@
 
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
+/// [`Simd::prefetch`] fetches nothing as many bytes after its address, or more.
+pub(crate) const PREFETCHED: usize = 3 * 64;
+
 /// A proof that the processor has a backend's instructions.
 pub trait Simd: Copy {
     /// Four floats.
@@ -59,7 +62,7 @@ pub trait Simd: Copy {
         ]
     }
 
-    /// Has the three cache lines from `address` on fetched, if the backend can. Any address will do.
+    /// Has the [three](PREFETCHED) cache lines from `address` on fetched, if the backend can. Any address will do.
     fn prefetch(self, address: *const u8);
     /// Has one cache line fetched.
     fn prefetch_line(self, address: *const u8);

@@ -6,7 +6,7 @@ use crate::{
     simd::Simd,
     slab::{NarrowRay, reach_of},
 };
-use core::{mem::MaybeUninit, ops::ControlFlow};
+use core::{mem::MaybeUninit, ops::ControlFlow, ptr};
 
 /// What is done on the way.
 pub(crate) trait Visitor<L: Leaves> {
@@ -91,6 +91,8 @@ pub(super) fn walk_boxes<
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
             let node = unsafe { bvh.node(current) };
+            // Read when it is known which, too late to wait for a line that the boxes were not in.
+            N::prefetch_links(token, ptr::from_ref(node).cast());
             let (mut mask, near) = boxes.test(node, t_max);
             if mask == 0 {
                 match pop(&stack, &mut len, t_max) {

@@ -38,8 +38,8 @@ const ENDED: u32 = u32::MAX;
 /// As many of a stack's entries are looked at together.
 const FEW: usize = 8;
 
-/// Over more primitives than this, of leaves that say where to read on that is fetched, too. Smaller scenes are in the
-/// caches.
+/// Over more primitives than this nodes' links are fetched, too, and of leaves that say where to read on what is there. Smaller
+/// scenes are in the caches.
 const LARGE: usize = 1 << 18;
 
 /// A ray under way.
@@ -122,13 +122,13 @@ pub(super) fn trace<
                 let ahead = in_list(at_node.get(place + 1)).test_boxes(token, bvh);
                 let state = in_list(lane);
                 state.take_children::<T, N, Q>(token, &tested);
-                fetch(token, bvh, before);
+                fetch(token, bvh, before, is_large);
                 (tested, before) = (ahead, state.current);
                 let leaf = before.is_leaf();
                 at_node.push_if(&mut nodes, lane, !leaf);
                 at_rest.push_if(&mut rest, lane, leaf);
             }
-            fetch(token, bvh, before);
+            fetch(token, bvh, before, is_large);
             continue;
         }
         let (mut leaves, mut ends) = (0, 0);
@@ -173,12 +173,13 @@ fn in_list<'a>(lane: *mut Lane) -> &'a mut Lane {
     unsafe { &mut *lane }
 }
 
-/// Has what is next for a ray fetched, or anything if it has ended.
+/// Has what is next for a ray fetched, or anything if it has ended. All of a node only if the scene `is_large`.
 #[inline(always)]
 fn fetch<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
     token: T,
     bvh: &Bvh<N, L, S>,
     next: Link,
+    is_large: bool,
 ) {
     // Not by a branch, nor anything that may become one. The address that is not meant may be of nothing, and past what
     // 32 bits hold.
@@ -186,7 +187,11 @@ fn fetch<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage>(
     let node = nodes.wrapping_byte_add(next.node_offset()).addr();
     let leaf = bvh.leaf_address(next.leaf()).addr();
     let is_leaf = 0usize.wrapping_sub(usize::from(next.is_leaf()));
-    token.prefetch(ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf)));
+    let next = ptr::without_provenance(node ^ ((node ^ leaf) & is_leaf));
+    token.prefetch(next);
+    if is_large {
+        N::prefetch_links(token, next);
+    }
 }
 
 impl Lane {
@@ -299,6 +304,9 @@ impl Lane {
             if let Some(hits) = leaf.test::<T, true>(token, &shear, self.t_max) {
                 let best = &mut self.found;
                 Found::choose_unbranched(best, &mut self.t_max, leaf, hits, bvh.primitives());
+                // Its number is read when the ray has ended.
+                let place = best.as_ref().map_or(0, |best| best.place);
+                token.prefetch_line(bvh.primitives().as_ptr().wrapping_add(place).cast());
                 self.far = reach_of(self.t_max, self.narrow.margin());
                 self.forget_the_far(token);
             }
