@@ -198,19 +198,7 @@ pub trait Triangles: Copy {
         if !look.may_hit() {
             return None;
         }
-        Some(self.hits::<S, NEED_T>(token, ray, look, t_max))
-    }
-
-    /// The rest of the test.
-    #[inline(always)]
-    fn hits<S: Simd, const NEED_T: bool>(
-        self,
-        token: S,
-        ray: &RayShear,
-        look: Look<Self::Lanes<S>>,
-        t_max: f32,
-    ) -> TriangleHits<Self::Lanes<S>> {
-        self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max)
+        Some(self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max))
     }
 }
 
