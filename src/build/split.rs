@@ -4,6 +4,8 @@
 //! Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
 
 use super::refs::{Bounds, Ref, half_areas};
+use bytemuck::cast;
+use std::vec::Vec;
 use wide::{f32x4, i32x4};
 
 /// So many references are binned in one go where many cores share the work.
@@ -93,6 +95,8 @@ pub(super) struct Cut {
     axis: usize,
     /// The first bin of the right side.
     bin: i32,
+    /// How many are left.
+    left: usize,
 }
 
 impl Cut {
@@ -135,24 +139,46 @@ impl Cut {
         self.grid.bins(r.center2())[self.axis] < self.bin
     }
 
-    /// Sorts `refs` into those left and right of the cut: how many are left, and the bounds of either
-    /// side's twice-centers.
+    /// Sorts `refs`, of which the cut was found, into those left of it and the others: how many are left, and the bounds of
+    /// either side's twice-centers.
+    ///
+    /// Either side keeps its order: what lies together in a mesh is read together later. Which side is a toss-up: all is
+    /// done for both, and no branch is taken.
     #[inline(always)]
     pub fn partition(&self, refs: &mut [Ref]) -> (usize, Bounds, Bounds) {
-        let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
-        let (mut start, mut end) = (0, refs.len());
-        while start < end {
-            let center2 = refs[start].center2();
-            if self.grid.bins(center2)[self.axis] < self.bin {
-                left = left.join_point(center2);
-                start += 1;
-            } else {
-                right = right.join_point(center2);
-                end -= 1;
-                refs.swap(start, end);
-            }
+        let (origin, scale) = (self.grid.origin.to_array(), self.grid.scale.to_array());
+        let along = Grid {
+            origin: f32x4::splat(origin[self.axis]),
+            scale: f32x4::splat(scale[self.axis]),
+        };
+        let bin = i32x4::splat(self.bin);
+        // One more, to write to in vain once all are there.
+        let mut others = Vec::with_capacity(refs.len() - self.left + 1);
+        let room = others.spare_capacity_mut();
+        let (mut left_centers, mut other_centers) = (Bounds::EMPTY, Bounds::EMPTY);
+        let mut left = 0;
+        for place in 0..refs.len() {
+            let r = refs[place];
+            let Bounds { min, max } = r.bounds();
+            let [min, max] = [min, max].map(|side| f32x4::splat(side.to_array()[self.axis]));
+            let is_left: f32x4 = cast(i32x4::new(along.bins(min + max)).simd_lt(bin));
+            let center2 = r.center2();
+            left_centers = left_centers.join(Bounds {
+                min: is_left.select(center2, Bounds::EMPTY.min),
+                max: is_left.select(center2, Bounds::EMPTY.max),
+            });
+            other_centers = other_centers.join(Bounds {
+                min: is_left.select(Bounds::EMPTY.min, center2),
+                max: is_left.select(Bounds::EMPTY.max, center2),
+            });
+            refs[left] = r;
+            room[place - left].write(r);
+            left += is_left.to_bitmask() as usize & 1;
         }
-        (start, left, right)
+        // SAFETY: each place up to the length was written before it was left behind; none of `room` is above the capacity.
+        unsafe { others.set_len(refs.len() - left) };
+        refs[left..].copy_from_slice(&others);
+        (left, left_centers, other_centers)
     }
 }
 
@@ -173,7 +199,7 @@ impl Grid {
             right_costs[bin] = half_areas(bounds) * floats(counts);
         }
         // By axis, the cost, and then how uneven it is: where areas are all zero, halves keep the tree shallow.
-        let mut best = [((f32::INFINITY, u32::MAX), 0); 3];
+        let mut best = [((f32::INFINITY, u32::MAX), 0, 0); 3];
         let mut least = f32x4::splat(f32::INFINITY);
         let (mut bounds, mut counts) = ([Bounds::EMPTY; 3], [0; 4]);
         for bin in 1..B {
@@ -188,7 +214,7 @@ impl Grid {
                 let (left, right) = (counts[axis], right_counts[bin][axis]);
                 let key = (costs[axis], left.abs_diff(right));
                 if left > 0 && right > 0 && key < best.0 {
-                    *best = (key, bin);
+                    *best = (key, bin, left);
                 }
             }
             least = f32x4::new([best[0].0.0, best[1].0.0, best[2].0.0, f32::NEG_INFINITY]);
@@ -196,13 +222,14 @@ impl Grid {
         let scale = self.scale.to_array();
         let mut cheapest = (f32::INFINITY, u32::MAX);
         let mut cut = None;
-        for (axis, (key, bin)) in best.into_iter().enumerate() {
+        for (axis, (key, bin, left)) in best.into_iter().enumerate() {
             if scale[axis] > 0.0 && key < cheapest {
                 cheapest = key;
                 cut = Some(Cut {
                     grid: *self,
                     axis,
                     bin: bin as i32,
+                    left: left as usize,
                 });
             }
         }
