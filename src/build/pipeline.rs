@@ -36,12 +36,12 @@ const GROUPED: Effort = Effort {
     least_gain: 1e-3,
 };
 
-/// Most of what there is to gain in a few rounds: a kitchen goes from 8.8 nodes a bounce ray to 6.9, in a tenth of the
-/// build.
+/// Most of what there is to gain, in a tenth to a fifth of the build: a kitchen goes from 8.8 nodes a bounce ray to 6.7, a
+/// temple from 9.0 after five rounds to 7.9. Scans have little to gain and are done after two.
 const QUICK: Effort = Effort {
-    rounds: 5,
-    share: 10,
-    least_gain: 1e-2,
+    rounds: 12,
+    share: 15,
+    least_gain: 1e-3,
 };
 
 /// What a caller wants of a build.
