@@ -16,7 +16,7 @@ use crate::{
     simd::{Backend, Operation, Simd},
 };
 use bytemuck::Zeroable;
-use core::{marker::PhantomData, ops::Range};
+use core::{array::from_fn, marker::PhantomData, ops::Range};
 use std::vec::Vec;
 
 /// The parts that [`Bvh::from_parts`](crate::layout::Bvh::from_parts) takes.
@@ -156,22 +156,19 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
                 return Err(LayoutError::TooDeep(place).into());
             }
             // The likeliest first: its nodes follow, close by.
-            let mut lanes = [(0.0, 0); W];
-            for (lane, &child) in children[..count].iter().enumerate() {
-                let area = measure.half_area(shape.aabb(child));
-                // By insertion: there are few, and equals stay in order.
-                let mut place = lane;
-                while place > 0 && lanes[place - 1].0 < area {
-                    lanes[place] = lanes[place - 1];
-                    place -= 1;
-                }
-                lanes[place] = (area, child);
+            let mut areas = [0.0; W];
+            for (area, &child) in areas.iter_mut().zip(&children[..count]) {
+                *area = measure.half_area(shape.aabb(child));
+            }
+            let mut lanes = [0; W];
+            for (child, place) in children.into_iter().zip(places_by_size(&areas)) {
+                lanes[place % W] = child;
             }
             if N::NODES_FIRST {
-                lanes[..count].sort_by_key(|&(_, child)| shape.is_leaf(child));
+                lanes[..count].sort_by_key(|&child| shape.is_leaf(child));
             }
             let (known, first) = (todo.len(), nodes.len());
-            let lanes = lanes[..count].iter().map(|&(_, child)| {
+            let lanes = lanes[..count].iter().map(|&child| {
                 let link = if shape.is_leaf(child) {
                     leaf(child);
                     leaves += 1;
@@ -194,6 +191,15 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
         nodes.shrink_to_fit();
         Ok(nodes)
     }
+}
+
+/// The place of each size, none negative, the greatest first; of those that are nearly equal the first. Each is compared
+/// with all: which is greater is a toss-up.
+#[inline(always)]
+fn places_by_size<const W: usize>(sizes: &[f32; W]) -> [usize; W] {
+    const { assert!(W <= 8) };
+    let keys: [u32; W] = from_fn(|lane| sizes[lane].to_bits() & !7 | (7 - lane as u32));
+    keys.map(|key| keys.iter().map(|&other| usize::from(other > key)).sum())
 }
 
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.
