@@ -2,17 +2,17 @@
 
 /// What a hierarchy is built for: once and traced for long, or anew for every picture.
 ///
-/// The answers are the same. On one thread of an AMD EPYC of the first Zen generation, over a scan of 70,000 triangles, one
-/// of 870,000, a kitchen and three game levels:
+/// The answers are the same. On one thread of a Zen 4 (AMD EPYC), over a scan of 70,000 triangles, one of 870,000, a kitchen
+/// and three game levels:
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 110 to 150 | 0.77 |
-/// | [`Balanced`](Self::Balanced) | 580 to 710 | 0.93 |
-/// | [`Best`](Self::Best) | 1,700 to 2,500 | 1 |
+/// | [`Fast`](Self::Fast) | 60 to 85 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 310 to 460 | 0.95 |
+/// | [`Best`](Self::Best) | 1,070 to 1,700 | 1 |
 ///
-/// A Zen 4 takes half as long. What moves without changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a
-/// triangle there.
+/// An EPYC of the first Zen generation takes some twice as long. What moves without changing can be
+/// [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
@@ -20,7 +20,7 @@ pub enum Preset {
     /// from the bottom up (Meister and Bittner, "Parallel locally-ordered clustering", 2018).
     Fast,
     /// For what is loaded while somebody waits: a tree from the top down by the surface area heuristic, without cuts
-    /// through triangles, and a few rounds of moving subtrees to where they cost less.
+    /// through triangles, and some rounds of moving subtrees to where they cost less.
     Balanced,
     /// For what is built once: cuts through large triangles, and subtrees moved for as long as it gains.
     #[default]
