@@ -37,7 +37,7 @@ const GROUPED: Effort = Effort {
 };
 
 /// Most of what there is to gain, in a tenth to a fifth of the build: a kitchen goes from 8.8 nodes a bounce ray to 6.7, a
-/// temple from 9.0 after five rounds to 7.9. Scans have little to gain and are done after two.
+/// temple from 9.0 after five rounds to 7.9. Scans have little to gain and are done early.
 const QUICK: Effort = Effort {
     rounds: 12,
     share: 15,
