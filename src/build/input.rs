@@ -61,6 +61,10 @@ pub(super) trait Input: Sync {
     fn place(&self, id: u32) -> Self::Place;
     /// What a leaf has of the primitive at a place.
     fn load_from(&self, place: Self::Place) -> Self::Loaded;
+    /// Has fetched what [`place`](Self::place) reads.
+    fn fetch_place<S: Simd>(&self, token: S, id: u32);
+    /// Has fetched what [`load_from`](Self::load_from) reads.
+    fn fetch<S: Simd>(&self, token: S, place: Self::Place);
     /// What a leaf has of a primitive.
     #[inline(always)]
     fn load(&self, id: u32) -> Self::Loaded {
@@ -142,6 +146,14 @@ impl Triangles<'_> {
         self.0.indices()[id as usize].map(|vertex| self.corner(vertex))
     }
 
+    /// The box around three vertices. The sum turns -0.0 into 0.0, so that the order of joins never shows.
+    #[inline(always)]
+    fn aabb_of(&self, vertices: [u32; 3]) -> Aabb {
+        let [a, b, c] = vertices.map(|vertex| Vec3A::from(self.corner(vertex)));
+        let (min, max) = (a.min(b).min(c) + 0.0, a.max(b).max(c) + 0.0);
+        Aabb::new(min.into(), max.into())
+    }
+
     /// The first corner that is not finite.
     #[cold]
     fn non_finite(&self, id: u32) -> Option<BuildError> {
@@ -154,14 +166,6 @@ impl Triangles<'_> {
             position: corners[corner],
         })
     }
-}
-
-/// The box around a triangle. The sum turns -0.0 into 0.0, so that the order of joins never shows.
-#[inline(always)]
-fn triangle_aabb(corners: [Vec3; 3]) -> Aabb {
-    let [a, b, c] = corners.map(Vec3A::from);
-    let (min, max) = (a.min(b).min(c) + 0.0, a.max(b).max(c) + 0.0);
-    Aabb::new(min.into(), max.into())
 }
 
 impl Input for Triangles<'_> {
@@ -203,7 +207,7 @@ impl Input for Triangles<'_> {
 
     #[inline]
     fn aabb(&self, id: u32) -> Aabb {
-        triangle_aabb(self.corners(id))
+        self.aabb_of(self.place(id))
     }
 
     #[inline]
@@ -223,6 +227,20 @@ impl Input for Triangles<'_> {
     #[inline(always)]
     fn place(&self, id: u32) -> [u32; 3] {
         self.0.indices()[id as usize]
+    }
+
+    #[inline(always)]
+    fn fetch_place<S: Simd>(&self, token: S, id: u32) {
+        let indices = self.0.indices().as_ptr();
+        token.prefetch_line(indices.wrapping_add(id as usize).cast());
+    }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, vertices: [u32; 3]) {
+        let positions = self.0.positions().as_ptr();
+        for vertex in vertices {
+            token.prefetch_line(positions.wrapping_add(vertex as usize).cast());
+        }
     }
 
     #[inline(always)]
@@ -317,6 +335,14 @@ impl Input for Boxes<'_> {
     }
 
     #[inline(always)]
+    fn fetch_place<S: Simd>(&self, _: S, _: u32) {}
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, id: u32) {
+        token.prefetch_line(self.0.as_ptr().wrapping_add(id as usize).cast());
+    }
+
+    #[inline(always)]
     fn load_from(&self, id: u32) -> Aabb {
         self.aabb(id)
     }
@@ -356,7 +382,7 @@ impl Input for TrianglesInRuns<'_> {
     type Leaf = PrimitiveLeaf;
     /// How many there are.
     type Filling<S: Simd> = usize;
-    type Place = u32;
+    type Place = [u32; 3];
     type Loaded = Aabb;
     const UNLOADED: Aabb = Aabb::EMPTY;
     const MAX_LEAF: usize = PrimitiveLeaf::MAX_PRIMITIVES;
@@ -392,13 +418,23 @@ impl Input for TrianglesInRuns<'_> {
     }
 
     #[inline(always)]
-    fn place(&self, id: u32) -> u32 {
-        id
+    fn place(&self, id: u32) -> [u32; 3] {
+        Triangles(self.0).place(id)
     }
 
     #[inline(always)]
-    fn load_from(&self, id: u32) -> Aabb {
-        self.aabb(id)
+    fn fetch_place<S: Simd>(&self, token: S, id: u32) {
+        Triangles(self.0).fetch_place(token, id);
+    }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, vertices: [u32; 3]) {
+        Triangles(self.0).fetch(token, vertices);
+    }
+
+    #[inline(always)]
+    fn load_from(&self, vertices: [u32; 3]) -> Aabb {
+        Triangles(self.0).aabb_of(vertices)
     }
 
     #[inline(always)]

@@ -90,6 +90,16 @@ impl<I: Input> Input for Pieces<'_, I> {
     }
 
     #[inline(always)]
+    fn fetch_place<S: Simd>(&self, token: S, number: u32) {
+        self.input.fetch_place(token, self.primitive(number));
+    }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, place: I::Place) {
+        self.input.fetch(token, place);
+    }
+
+    #[inline(always)]
     fn load_from(&self, place: I::Place) -> I::Loaded {
         self.input.load_from(place)
     }

@@ -11,7 +11,7 @@ pub(super) struct Runs<'a, L> {
     pub nodes: &'a mut Vec<Node>,
 }
 
-/// So many are loaded at once: the cache misses of one wait for those of none before it.
+/// So many are loaded at once, while those after them are fetched: their cache misses wait for nothing.
 const AHEAD: usize = 64;
 
 /// How many times as much a run may cost as leaves that are joined elsewhere: so there are 15 % fewer of them, which is
@@ -60,16 +60,27 @@ impl<I: Input> Operation for Cut<'_, I> {
         let mut cost = f32::INFINITY;
         let mut count = 0;
         let mut place = first;
+        // Those of the next `AHEAD`, once their turn comes.
         let mut places = [I::Place::default(); AHEAD];
         let mut ahead = [I::UNLOADED; AHEAD];
-        for ids in ids.chunks(AHEAD) {
-            for (place, &id) in places.iter_mut().zip(ids) {
-                *place = input.place(id);
-            }
-            for (loaded, &place) in ahead.iter_mut().zip(&places[..ids.len()]) {
+        for (place, &id) in places.iter_mut().zip(ids) {
+            *place = input.place(id);
+        }
+        let mut later = ids;
+        while !later.is_empty() {
+            let now = later.len().min(AHEAD);
+            later = &later[now..];
+            for (loaded, &place) in ahead.iter_mut().zip(&places[..now]) {
                 *loaded = input.load_from(place);
             }
-            for loaded in &ahead[..ids.len()] {
+            for (index, loaded) in ahead[..now].iter().enumerate() {
+                if let Some(&id) = later.get(index) {
+                    places[index] = input.place(id);
+                    input.fetch(token, places[index]);
+                }
+                if let Some(&id) = later.get(index + AHEAD) {
+                    input.fetch_place(token, id);
+                }
                 let own = I::bounds(loaded);
                 let own_cost = half_area(own, scale) * I::leaf_cost(1);
                 let joined = bounds.join(own);
