@@ -5,18 +5,22 @@
 use super::monitor::Watch;
 use crate::{
     geometry::Aabb,
-    simd::{Backend, Lanes, Operation, Simd, Vector, splat3},
+    simd::{Backend, Lanes, Operation, Simd, Vector},
 };
 use std::{vec, vec::Vec};
 
-/// How far along the curve a cluster looks to either side: as far as eight lanes go, in the middle of which it is
-/// itself.
+/// How far along the curve a cluster looks to either side.
 const RADIUS: usize = 3;
-const SLOTS: usize = 8;
-/// The bits that tell them apart.
-const SLOT: u32 = SLOTS as u32 - 1;
-/// All but its own and the last, which has no partner on the other side.
-const OTHERS: u32 = 0b0111_0111;
+/// The offsets to those that it looks at, from `-RADIUS` on, are told by a slot each; the one in the middle is its own.
+const SLOTS: usize = 2 * RADIUS + 1;
+/// The bits of a slot.
+const SLOT: u32 = 7;
+const _: () = assert!(SLOTS <= SLOT as usize);
+/// So many are looked at in one go.
+const LANES: usize = 8;
+const AROUND: usize = LANES + 2 * RADIUS;
+/// Places of no cluster after the last.
+const AFTER: usize = LANES + RADIUS;
 
 /// A node of the tree, after those below it. It is never in two cache lines.
 #[derive(Clone, Copy, Debug)]
@@ -95,27 +99,35 @@ pub(super) fn join(
     watch: &Watch,
 ) -> Vec<u32> {
     let backend = Backend::detect();
-    let mut nearest = vec![0; clusters.len()];
+    let mut slots = vec![0.0; RADIUS + clusters.len() + AFTER];
     let mut clusters = Clusters::new(nodes, clusters, scale);
     while clusters.places.len() > until.max(1) {
         let count = clusters.places.len();
-        clusters.search(backend, &mut nearest[..count]);
-        let left = backend.run(JoinPairs {
+        clusters.search(backend, &mut slots[RADIUS..]);
+        backend.run(JoinPairs {
             clusters: &mut clusters,
             nodes,
-            nearest: &nearest[..count],
+            slots: &slots,
         });
+        let left = clusters.places.len();
         // Clusters that all like the one before better than the one after are joined one a round. Then it
         // is halves.
         if left > count - count / 16 {
-            let halves = &mut nearest[..left];
-            for (other, place) in halves.iter_mut().zip(0u32..) {
-                *other = (place ^ 1).min(left as u32 - 1);
+            let own = &mut slots[RADIUS..][..left];
+            for (index, slot) in own.iter_mut().enumerate() {
+                *slot = to_slot(if index % 2 == 0 {
+                    RADIUS + 1
+                } else {
+                    RADIUS - 1
+                });
+            }
+            if left % 2 == 1 {
+                own[left - 1] = to_slot(RADIUS);
             }
             backend.run(JoinPairs {
                 clusters: &mut clusters,
                 nodes,
-                nearest: halves,
+                slots: &slots,
             });
         }
         if !watch.advance(count - clusters.places.len()) {
@@ -125,148 +137,69 @@ pub(super) fn join(
     clusters.places
 }
 
+/// A slot as floats have it that are compared: no denormal, which some programs have taken for zero.
+const fn to_slot(slot: usize) -> f32 {
+    f32::from_bits(1.0f32.to_bits() | slot as u32)
+}
+
 /// Clusters along the curve.
 struct Clusters {
-    /// Their boxes, by side and axis, scaled by the scene's measure. Around each are [`SLOTS`], of which those before the
-    /// first and after the last are far too large for anyone.
+    /// Their boxes, by side and axis, scaled by the scene's measure. There are [`RADIUS`] before the first and
+    /// [`AFTER`] after the last that are far too large for anyone.
     planes: [Vec<f32>; 6],
     /// Their places among the nodes.
     places: Vec<u32>,
-    scale: f32,
 }
 
 impl Clusters {
     fn new(nodes: &[Node], places: Vec<u32>, scale: f32) -> Self {
         let count = places.len();
-        let mut planes = [-FAR, -FAR, -FAR, FAR, FAR, FAR].map(|far| vec![far; count + SLOTS]);
+        let mut planes =
+            [-FAR, -FAR, -FAR, FAR, FAR, FAR].map(|far| vec![far; RADIUS + count + AFTER]);
         {
             let [x0, y0, z0, x1, y1, z1] = planes
                 .each_mut()
                 .map(|planes| &mut planes[RADIUS..RADIUS + count]);
             for (index, &place) in places.iter().enumerate() {
-                let sides = sides(&nodes[place as usize].aabb, scale);
-                [
-                    x0[index], y0[index], z0[index], x1[index], y1[index], z1[index],
-                ] = sides;
+                let Aabb { min, max } = nodes[place as usize].aabb;
+                let (min, max) = (min * scale, max * scale);
+                (x0[index], y0[index], z0[index]) = (min.x, min.y, min.z);
+                (x1[index], y1[index], z1[index]) = (max.x, max.y, max.z);
             }
         }
-        Self {
-            planes,
-            places,
-            scale,
-        }
+        Self { planes, places }
     }
 
-    /// Puts what is far after the last.
-    fn end(&mut self) {
-        let end = self.places.len() + RADIUS;
-        for (side, planes) in self.planes.iter_mut().enumerate() {
-            planes.truncate(end);
-            planes.resize(end + SLOTS - RADIUS, if side < 3 { -FAR } else { FAR });
-        }
-    }
-
-    /// The best partner of each.
-    fn search(&self, backend: Backend, nearest: &mut [u32]) {
-        let search = |(first, nearest): (usize, &mut [u32])| {
+    /// The slot of each one's best partner.
+    fn search(&self, backend: Backend, slots: &mut [f32]) {
+        let slots = &mut slots[..self.places.len().next_multiple_of(LANES)];
+        let search = |(first, slots): (usize, &mut [f32])| {
             backend.run(Search {
                 planes: self.planes.each_ref().map(|planes| &planes[first..]),
-                first: first as u32,
-                nearest,
+                slots,
             });
         };
         #[cfg(feature = "rayon")]
-        if nearest.len() > 4 * super::parallel::TASK {
+        if slots.len() > 4 * super::parallel::TASK {
             use super::parallel::TASK;
             use rayon::prelude::*;
-            let chunks = nearest.par_chunks_mut(TASK).enumerate();
-            chunks.for_each(|(chunk, nearest)| search((chunk * TASK, nearest)));
+            let chunks = slots.par_chunks_mut(TASK).enumerate();
+            chunks.for_each(|(chunk, slots)| search((chunk * TASK, slots)));
             return;
         }
-        search((0, nearest));
+        search((0, slots));
     }
-
-    /// Joins those that are each other's nearest: how many are left.
-    #[inline(always)]
-    fn join_pairs(&mut self, nodes: &mut Vec<Node>, nearest: &[u32]) -> usize {
-        let Self {
-            planes,
-            places,
-            scale,
-        } = self;
-        // What is left moves up: it never comes after where it was.
-        let mut left = 0;
-        let count = nearest.len();
-        let places_now = &mut places[..count];
-        let [x0, y0, z0, x1, y1, z1] = planes.each_mut().map(|planes| &mut planes[RADIUS..]);
-        let (x0, y0, z0) = (&mut x0[..count], &mut y0[..count], &mut z0[..count]);
-        let (x1, y1, z1) = (&mut x1[..count], &mut y1[..count], &mut z1[..count]);
-        for (index, &other) in nearest.iter().enumerate() {
-            let other = other as usize;
-            if left >= count || other >= count {
-                break;
-            }
-            let mutual = nearest[other] as usize == index;
-            if mutual && other < index {
-                continue;
-            }
-            let mut place = places_now[index];
-            if mutual && other != index {
-                let second = places_now[other];
-                let [a, b] = [place, second].map(|place| nodes[place as usize].aabb);
-                let aabb = a.join(b);
-                let node = Node {
-                    aabb,
-                    first: place,
-                    second: second | Node::INNER,
-                };
-                place = nodes.len() as u32;
-                nodes.push(node);
-                [x0[left], y0[left], z0[left], x1[left], y1[left], z1[left]] = sides(&aabb, *scale);
-            } else {
-                (x0[left], y0[left], z0[left]) = (x0[index], y0[index], z0[index]);
-                (x1[left], y1[left], z1[left]) = (x1[index], y1[index], z1[index]);
-            }
-            places_now[left] = place;
-            left += 1;
-        }
-        places.truncate(left);
-        self.end();
-        left
-    }
-}
-
-struct JoinPairs<'a> {
-    clusters: &'a mut Clusters,
-    nodes: &'a mut Vec<Node>,
-    nearest: &'a [u32],
-}
-
-impl Operation for JoinPairs<'_> {
-    type Output = usize;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> usize {
-        self.clusters.join_pairs(self.nodes, self.nearest)
-    }
-}
-
-/// The planes of a box.
-#[inline(always)]
-fn sides(&Aabb { min, max }: &Aabb, scale: f32) -> [f32; 6] {
-    let (min, max) = (min * scale, max * scale);
-    [min.x, min.y, min.z, max.x, max.y, max.z]
 }
 
 /// For each of a run of clusters the one with which the box is least; of equals the first.
 ///
-/// Areas are compared together with the place, which takes the last bits. So the order is one of pairs, the same
+/// Areas are compared together with the slot, which takes the last bits. So the order is one of pairs, the same
 /// seen from both sides: the least pair is always joined.
 struct Search<'a> {
-    /// From what is before the first on.
+    /// From [`RADIUS`] before the first on.
     planes: [&'a [f32]; 6],
-    first: u32,
-    nearest: &'a mut [u32],
+    /// Of whole [`LANES`].
+    slots: &'a mut [f32],
 }
 
 impl Operation for Search<'_> {
@@ -274,30 +207,204 @@ impl Operation for Search<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, token: S) {
-        let [x0, y0, z0, x1, y1, z1] = self.planes.map(|planes| planes.windows(SLOTS));
-        let around = x0.zip(y0).zip(z0).zip(x1).zip(y1).zip(z1);
-        let others = S::F32x8::of_bits(token, OTHERS);
+        let [a, b, c, d, e, f] = self.planes;
         let area_bits = S::F32x8::splat(token, f32::from_bits(!SLOT));
-        let slots = S::F32x8::load(token, &[0, 1, 2, 3, 4, 5, 6, 7].map(f32::from_bits));
-        let places = self.nearest.iter_mut().zip(self.first..);
-        for ((nearest, place), (((((x0, y0), z0), x1), y1), z1)) in places.zip(around) {
-            let min = [load(token, x0), load(token, y0), load(token, z0)];
-            let max = [load(token, x1), load(token, y1), load(token, z1)];
-            let own_min: [S::F32x8; 3] = splat3(token, [x0[RADIUS], y0[RADIUS], z0[RADIUS]]);
-            let own_max: [S::F32x8; 3] = splat3(token, [x1[RADIUS], y1[RADIUS], z1[RADIUS]]);
-            let x = own_max[0].max(max[0]) - own_min[0].min(min[0]);
-            let y = own_max[1].max(max[1]) - own_min[1].min(min[1]);
-            let z = own_max[2].max(max[2]) - own_min[2].min(min[2]);
-            let area = x * y + (x + y) * z;
-            let slot = ((area & area_bits) | slots).least(others);
-            *nearest = (place + slot as u32).wrapping_sub(RADIUS as u32);
+        let slot_bits = S::F32x8::splat(token, f32::from_bits(SLOT));
+        let one = S::F32x8::splat(token, 1.0);
+        let chunks = self.slots.chunks_exact_mut(LANES);
+        for (slots, first) in chunks.zip((0..).step_by(LANES)) {
+            let boxes = [
+                around(a, first),
+                around(b, first),
+                around(c, first),
+                around(d, first),
+                around(e, first),
+                around(f, first),
+            ];
+            let [x0, y0, z0, x1, y1, z1]: [S::F32x8; 6] = boxes_at(token, boxes, RADIUS);
+            let mut least = S::F32x8::splat(token, f32::INFINITY);
+            for slot in (0..SLOTS).filter(|&slot| slot != RADIUS) {
+                let other = boxes_at(token, boxes, slot);
+                let x = x1.max(other[3]) - x0.min(other[0]);
+                let y = y1.max(other[4]) - y0.min(other[1]);
+                let z = z1.max(other[5]) - z0.min(other[2]);
+                let area = x * y + (x + y) * z;
+                let slot = S::F32x8::splat(token, f32::from_bits(slot as u32));
+                least = ((area & area_bits) | slot).min_from_zero(least);
+            }
+            slots.copy_from_slice(&((least & slot_bits) | one).to_array());
         }
     }
 }
 
+/// Joins those that are each other's nearest, eight at a time: who is joined nobody foresees.
+struct JoinPairs<'a> {
+    clusters: &'a mut Clusters,
+    nodes: &'a mut Vec<Node>,
+    /// After [`RADIUS`] of no cluster.
+    slots: &'a [f32],
+}
+
+impl Operation for JoinPairs<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) {
+        let Self {
+            clusters: Clusters { planes, places },
+            nodes,
+            slots,
+        } = self;
+        let count = places.len();
+        places.resize(count + AFTER, 0);
+        // What is left moves up: it never comes after where it was.
+        let mut left = 0;
+        for first in (0..count).step_by(LANES) {
+            let pairs = Pairs::<S::F32x8>::new(token, around(slots, first));
+            let all = (1 << (count - first).min(LANES)) - 1;
+            let kept = all & !pairs.joined_before.bits();
+            for (side, planes) in planes.iter_mut().enumerate() {
+                let around = around(planes, first);
+                let own: S::F32x8 = at(token, around, RADIUS);
+                let other = pairs.partners(token, around);
+                let joined = if side < 3 {
+                    own.min(other)
+                } else {
+                    own.max(other)
+                };
+                compress::<S>(joined, kept, planes, RADIUS + left);
+            }
+
+            let old: [u32; LANES + RADIUS] = places[first..]
+                .first_chunk()
+                .copied()
+                .unwrap_or([0; LANES + RADIUS]);
+            let own: &[f32; LANES] = bytemuck::cast_ref(old.first_chunk().unwrap_or(&[0; LANES]));
+            let own = S::F32x8::load(token, own);
+            compress::<S>(own, kept, bytemuck::cast_slice_mut(places), left);
+            let mut joined = all & pairs.joined();
+            while joined != 0 {
+                let lane = joined.trailing_zeros() as usize % LANES;
+                joined &= joined - 1;
+                let (one, other) = (old[lane], old[lane + pairs.offset(lane)]);
+                let [a, b] = [one, other].map(|place| nodes[place as usize].aabb);
+                let kept_before = (kept & ((1 << lane) - 1)).count_ones() as usize;
+                places[left + kept_before] = nodes.len() as u32;
+                nodes.push(Node {
+                    aabb: a.join(b),
+                    first: one,
+                    second: other | Node::INNER,
+                });
+            }
+            left += kept.count_ones() as usize;
+        }
+        places.truncate(left);
+        for (side, planes) in planes.iter_mut().enumerate() {
+            planes.truncate(RADIUS + left);
+            planes.resize(RADIUS + left + AFTER, if side < 3 { -FAR } else { FAR });
+        }
+    }
+}
+
+/// Which of eight clusters are joined.
+struct Pairs<V> {
+    /// With the one after them, with the second after them, and so on.
+    joined_after: [V; RADIUS],
+    /// The bits of those.
+    bits: [u32; RADIUS],
+    /// With any before them.
+    joined_before: V,
+}
+
+impl<V: Vector<LANES>> Pairs<V> {
+    /// Those of which each is in the other's slot.
+    #[inline(always)]
+    fn new(token: V::Token, slots: &[f32; AROUND]) -> Self {
+        let own: V = at(token, slots, RADIUS);
+        let none = own.lt(own);
+        let mut pairs = Self {
+            joined_after: [none; RADIUS],
+            bits: [0; RADIUS],
+            joined_before: none,
+        };
+        for offset in 1..=RADIUS {
+            let before = V::splat(token, to_slot(RADIUS - offset));
+            let after = V::splat(token, to_slot(RADIUS + offset));
+            let slots_before: V = at(token, slots, RADIUS - offset);
+            let slots_after: V = at(token, slots, RADIUS + offset);
+            let joined_after = own.eq(after) & slots_after.eq(before);
+            pairs.joined_after[offset - 1] = joined_after;
+            pairs.bits[offset - 1] = joined_after.bits();
+            pairs.joined_before = pairs.joined_before | own.eq(before) & slots_before.eq(after);
+        }
+        pairs
+    }
+
+    /// Those that are joined with one after them.
+    #[inline(always)]
+    fn joined(&self) -> u32 {
+        self.bits[0] | self.bits[1] | self.bits[2]
+    }
+
+    /// How far after a cluster the one is that it is joined with.
+    #[inline(always)]
+    fn offset(&self, lane: usize) -> usize {
+        let [_, second, third] = self.bits.map(|bits| bits as usize >> lane & 1);
+        1 + second + 2 * third
+    }
+
+    /// What those have that they are joined with; of others, what they have themselves.
+    #[inline(always)]
+    fn partners(&self, token: V::Token, all: &[f32; AROUND]) -> V {
+        let mut partners = at(token, all, RADIUS);
+        for (&joined, slot) in self.joined_after.iter().zip(RADIUS + 1..) {
+            partners = joined.select(at(token, all, slot), partners);
+        }
+        partners
+    }
+}
+
+/// What is within [`RADIUS`] of eight clusters, where there is as much before the first of all.
 #[inline(always)]
-fn load<S: Simd>(token: S, window: &[f32]) -> S::F32x8 {
-    S::F32x8::load(token, window.first_chunk().unwrap_or(&[0.0; SLOTS]))
+fn around(all: &[f32], first: usize) -> &[f32; AROUND] {
+    let all = all.get(first..).and_then(|all| all.first_chunk());
+    all.unwrap_or(&[0.0; AROUND])
+}
+
+/// What is in a slot of each of the eight.
+#[inline(always)]
+fn at<V: Vector<LANES>>(token: V::Token, around: &[f32; AROUND], slot: usize) -> V {
+    V::load(token, around[slot..].first_chunk().unwrap_or(&[0.0; LANES]))
+}
+
+/// The same of boxes.
+//
+// Not a closure given to `map`: closures do not inherit a backend's instructions and stay calls.
+#[inline(always)]
+fn boxes_at<V: Vector<LANES>>(
+    token: V::Token,
+    [a, b, c, d, e, f]: [&[f32; AROUND]; 6],
+    slot: usize,
+) -> [V; 6] {
+    [
+        at(token, a, slot),
+        at(token, b, slot),
+        at(token, c, slot),
+        at(token, d, slot),
+        at(token, e, slot),
+        at(token, f, slot),
+    ]
+}
+
+/// Writes the lanes that `mask` has a bit for from a place on, and anything after them, eight in all.
+#[inline(always)]
+fn compress<S: Simd>(lanes: S::F32x8, mask: u32, to: &mut [f32], place: usize) {
+    let to = to.get_mut(place..).and_then(|to| to.first_chunk_mut());
+    if let Some(to) = to {
+        let to: &mut [f32; LANES] = to;
+        // SAFETY: an array of as many as there are lanes.
+        unsafe { lanes.compress(mask, to.as_mut_ptr()) };
+    }
 }
 
 #[cfg(test)]
