@@ -35,26 +35,19 @@ impl Corners {
 #[derive(Clone, Copy)]
 pub(super) struct Filling<S: Simd> {
     positions: [S::F32x8; 3],
-    vertices: usize,
+    vertices: u32,
     /// A byte a triangle, the first the lowest.
     corners: [u64; 3],
     triangles: usize,
 }
-
-/// From `8 + 7 - lane` on, all bits of that lane; of lane 8, none.
-static ONE_LANE: [f32; 2 * MOST + 7] = {
-    let mut lanes = [0.0; _];
-    lanes[2 * MOST - 1] = f32::from_bits(u32::MAX);
-    lanes
-};
 
 impl<S: Simd> Filling<S> {
     /// Of one triangle, whose corners are three vertices.
     #[inline(always)]
     pub fn of(token: S, corners: &Corners) -> Self {
         let mut filling = Self::of_none(token, corners);
-        filling.put(token, &corners.0[1], 1);
-        filling.put(token, &corners.0[2], 2);
+        filling.put(token, &corners.0[1], 1 << 1);
+        filling.put(token, &corners.0[2], 1 << 2);
         filling.corners = [0, 1, 2];
         filling.vertices = 3;
         filling
@@ -76,31 +69,32 @@ impl<S: Simd> Filling<S> {
     #[inline(always)]
     pub fn add(&mut self, token: S, corners: &Corners) -> bool {
         let [a, b, c] = &corners.0;
-        let same = [
+        let known = [
             self.same(token, a),
             self.same(token, b),
             self.same(token, c),
         ];
-        let [is_new_a, is_new_b, is_new_c] = [same[0] == 0, same[1] == 0, same[2] == 0];
-        let vertices = self.vertices;
-        let at_b = vertices + usize::from(is_new_a);
-        let at_c = at_b + usize::from(is_new_b);
-        let all = at_c + usize::from(is_new_c);
-        if all > MOST || self.triangles == TriangleLeaf::MAX_TRIANGLES {
+        let is_new = [known[0] == 0, known[1] == 0, known[2] == 0];
+        let at_b = self.vertices + u32::from(is_new[0]);
+        let at_c = at_b + u32::from(is_new[1]);
+        let vertices = at_c + u32::from(is_new[2]);
+        if vertices > MOST as u32 || self.triangles == TriangleLeaf::MAX_TRIANGLES {
             return false;
         }
-        self.put(token, a, if is_new_a { vertices } else { MOST });
-        self.put(token, b, if is_new_b { at_b } else { MOST });
-        self.put(token, c, if is_new_c { at_c } else { MOST });
-        let lane = |same: u32, new: usize| match same {
-            0 => new as u64,
-            _ => u64::from(same.trailing_zeros()),
-        };
+        let new = [
+            u32::from(is_new[0]) << self.vertices,
+            u32::from(is_new[1]) << at_b,
+            u32::from(is_new[2]) << at_c,
+        ];
+        self.put(token, a, new[0]);
+        self.put(token, b, new[1]);
+        self.put(token, c, new[2]);
         let shift = 8 * self.triangles as u32;
-        self.corners[0] |= lane(same[0], vertices) << shift;
-        self.corners[1] |= lane(same[1], at_b) << shift;
-        self.corners[2] |= lane(same[2], at_c) << shift;
-        self.vertices = all;
+        for (corner, corners) in self.corners.iter_mut().enumerate() {
+            let lane = (known[corner] | new[corner]).trailing_zeros();
+            *corners |= u64::from(lane) << shift;
+        }
+        self.vertices = vertices;
         self.triangles += 1;
         true
     }
@@ -118,11 +112,10 @@ impl<S: Simd> Filling<S> {
         (xs.eq(x) & ys.eq(y) & zs.eq(z)).bits()
     }
 
-    /// Puts a vertex in a lane, or in none if that is [`MOST`].
+    /// Puts a vertex in the lanes that there is a bit for.
     #[inline(always)]
-    fn put(&mut self, token: S, &[x, y, z, _]: &[f32; 4], lane: usize) {
-        let mask = &ONE_LANE[2 * MOST - 1 - lane..];
-        let mask = S::F32x8::load(token, mask.first_chunk().unwrap_or(&[0.0; MOST]));
+    fn put(&mut self, token: S, &[x, y, z, _]: &[f32; 4], lanes: u32) {
+        let mask = S::F32x8::of_bits(token, lanes);
         let [x, y, z] = splat3(token, [x, y, z]);
         let [xs, ys, zs] = self.positions;
         self.positions = [mask.select(x, xs), mask.select(y, ys), mask.select(z, zs)];

@@ -186,22 +186,25 @@ impl Input for Triangles<'_> {
     fn verdict(&self, id: u32) -> Verdict {
         let loaded = self.load(id);
         let Corners([a, b, c]) = loaded;
-        let [a, b, c] = [f32x4::new(a), f32x4::new(b), f32x4::new(c)];
-        // 0 times what is not finite is NaN.
-        let zero = f32x4::ZERO;
-        let is_finite = (a * zero + b * zero + c * zero).simd_eq(zero).to_bitmask() == 15;
-        if !is_finite && let Some(error) = self.non_finite(id) {
-            return Verdict::NonFinite(error);
-        }
-        let vectors = [a, b, c].map(|v| Vec3A::from_vec4(v.to_array().into()));
-        if !has_area(vectors) && is_degenerate(self.corners(id)) {
-            return Verdict::Unhittable;
+        let vectors = [
+            Vec3A::from_vec4(a.into()),
+            Vec3A::from_vec4(b.into()),
+            Vec3A::from_vec4(c.into()),
+        ];
+        // What is not finite has no area that is seen at once.
+        if !has_area(vectors) {
+            if let Some(error) = self.non_finite(id) {
+                return Verdict::NonFinite(error);
+            }
+            if is_degenerate(self.corners(id)) {
+                return Verdict::Unhittable;
+            }
         }
         // The sum turns -0.0 into 0.0, so that the order of joins never shows.
         let Bounds { min, max } = Self::bounds(&loaded);
         Verdict::Keep(Bounds {
-            min: min + zero,
-            max: max + zero,
+            min: min + f32x4::ZERO,
+            max: max + f32x4::ZERO,
         })
     }
 

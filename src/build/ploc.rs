@@ -287,7 +287,7 @@ impl Operation for JoinPairs<'_> {
                 let lane = joined.trailing_zeros() as usize % LANES;
                 joined &= joined - 1;
                 let (one, other) = (old[lane], old[lane + pairs.offset(lane)]);
-                let [a, b] = [one, other].map(|place| nodes[place as usize].aabb);
+                let (a, b) = (nodes[one as usize].aabb, nodes[other as usize].aabb);
                 let kept_before = (kept & ((1 << lane) - 1)).count_ones() as usize;
                 places[left + kept_before] = nodes.len() as u32;
                 nodes.push(Node {
@@ -349,8 +349,8 @@ impl<V: Vector<LANES>> Pairs<V> {
     /// How far after a cluster the one is that it is joined with.
     #[inline(always)]
     fn offset(&self, lane: usize) -> usize {
-        let [_, second, third] = self.bits.map(|bits| bits as usize >> lane & 1);
-        1 + second + 2 * third
+        let [_, second, third] = self.bits;
+        1 + (second >> lane & 1) as usize + 2 * (third >> lane & 1) as usize
     }
 
     /// What those have that they are joined with; of others, what they have themselves.

@@ -14,13 +14,15 @@ pub(crate) fn is_degenerate(corners: [Vec3; 3]) -> bool {
 /// [degenerate](is_degenerate).
 ///
 /// A difference is off by 2^-24 of itself, a product by three times that, and the normal by 2^-21 of the terms; what
-/// products lose to underflow is less than that of terms of 2^-100.
+/// products lose to underflow is less than that of terms of 2^-100. Sums are no less than what they are of, and not finite
+/// where a corner is not: the answer is no then.
 #[inline(always)]
 pub(crate) fn has_area([a, b, c]: [Vec3A; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac).abs();
-    let terms = ab.abs().max_element() * ac.abs().max_element();
-    terms > f32::from_bits(27 << 23) && normal.max_element() > terms * (f32::EPSILON * 16.0)
+    let terms = ab.abs().element_sum() * ac.abs().element_sum();
+    let least = Vec3A::splat(terms * (f32::EPSILON * 16.0));
+    terms > f32::from_bits(27 << 23) && normal.cmpgt(least).any()
 }
 
 fn is_collinear(corners: [Vec3; 3]) -> bool {
