@@ -16,7 +16,7 @@ use crate::{
     simd::{Backend, Operation, Simd},
 };
 use bytemuck::Zeroable;
-use core::{array::from_fn, marker::PhantomData, ops::Range};
+use core::{marker::PhantomData, ops::Range};
 use std::vec::Vec;
 
 /// The parts that [`Bvh::from_parts`](crate::layout::Bvh::from_parts) takes.
@@ -162,7 +162,7 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
             }
             let mut lanes = [0; W];
             for (child, place) in children.into_iter().zip(places_by_size(&areas)) {
-                lanes[place % W] = child;
+                lanes[place as usize % W] = child;
             }
             if N::NODES_FIRST {
                 lanes[..count].sort_by_key(|&child| shape.is_leaf(child));
@@ -196,10 +196,19 @@ impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Wa
 /// The place of each size, none negative, the greatest first; of those that are nearly equal the first. Each is compared
 /// with all: which is greater is a toss-up.
 #[inline(always)]
-fn places_by_size<const W: usize>(sizes: &[f32; W]) -> [usize; W] {
+fn places_by_size<const W: usize>(sizes: &[f32; W]) -> [u32; W] {
     const { assert!(W <= 8) };
-    let keys: [u32; W] = from_fn(|lane| sizes[lane].to_bits() & !7 | (7 - lane as u32));
-    keys.map(|key| keys.iter().map(|&other| usize::from(other > key)).sum())
+    let mut keys = [0; W];
+    for (lane, key) in keys.iter_mut().enumerate() {
+        *key = sizes[lane].to_bits() & !7 | (7 - lane as u32);
+    }
+    let mut places = [0; W];
+    for other in keys {
+        for (place, key) in places.iter_mut().zip(keys) {
+            *place += u32::from(other > key);
+        }
+    }
+    places
 }
 
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.
