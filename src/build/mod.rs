@@ -57,6 +57,7 @@ mod pages;
 mod parallel;
 mod pieces;
 mod pipeline;
+mod planes;
 mod ploc;
 mod preset;
 mod rebalance;

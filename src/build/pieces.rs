@@ -32,16 +32,41 @@ impl<'a, I: Input> Pieces<'a, I> {
         }
     }
 
-    /// Adds a piece: its number.
-    pub fn add_piece(&mut self, piece: Piece) -> u32 {
-        self.pieces.push(piece);
-        (self.input.len() + self.pieces.len() - 1) as u32
-    }
-
     #[inline]
     fn piece(&self, number: u32) -> Option<&Piece> {
         self.pieces
             .get((number as usize).checked_sub(self.input.len())?)
+    }
+}
+
+/// Pieces that were cut at a node of the tree and above it, of which those below it may be made.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'k> {
+    /// The number of the first that was cut here.
+    pub first: u32,
+    pub pieces: &'k [Piece],
+    pub above: Option<&'k Self>,
+}
+
+impl Known<'_> {
+    /// No piece.
+    pub const NONE: Self = Self {
+        first: 0,
+        pieces: &[],
+        above: None,
+    };
+
+    /// The piece of a number, if it is one's.
+    pub fn piece(&self, number: u32) -> Option<&Piece> {
+        let mut known = self;
+        loop {
+            if let Some(place) = number.checked_sub(known.first)
+                && let Some(piece) = known.pieces.get(place as usize)
+            {
+                return Some(piece);
+            }
+            known = known.above?;
+        }
     }
 }
 

@@ -51,6 +51,11 @@ impl Ref {
         self.max.to_array()[3].to_bits().wrapping_sub(NUMBER_OFFSET)
     }
 
+    /// The same box of another number.
+    pub fn with_id(&self, id: u32) -> Self {
+        Self::new(&self.bounds(), id)
+    }
+
     #[inline(always)]
     pub fn bounds(&self) -> Bounds {
         Bounds {

@@ -15,15 +15,17 @@ use super::{
     binned::{self, bounds_of_centers},
     clip::clip,
     input::Input,
-    lay_out::{Part, lay_out, prune},
+    lay_out::{self, lay_out, prune},
     monitor::{STRIDE, Watch},
-    pieces::{Piece, Pieces},
+    parallel::{TASK, join},
+    pieces::{Known, Piece, Pieces},
+    planes::{self, Plane, meet},
     refs::{Bounds, Ref, Refs},
     split::Cut,
     sweep::Leaves,
 };
 use crate::geometry::TriangleMesh;
-use std::{vec, vec::Vec};
+use std::{boxed::Box, vec, vec::Vec};
 use wide::f32x4;
 
 /// With fewer references nothing is cut. From 64 on, more is faster, smaller and sooner built.
@@ -37,8 +39,8 @@ const OVERLAP_HERE: f32 = 0.05;
 const LARGE: f32 = 0.15;
 /// How deep this goes: then it is up to the other builder, which has a bound as well.
 const MAX_DEPTH: u32 = 48;
-/// 16 are sooner done, and a level that gains 9 % of nodes and leaves then gains 3.
-const BINS: usize = 32;
+/// Numbers that a cut takes: both parts have a new one each, and what is cut keeps its own, should the cut be given up.
+const NUMBERS: usize = 2;
 
 /// Where in a build the cuts are done, and the tree.
 const CUT: f32 = 0.35;
@@ -56,8 +58,7 @@ pub(super) fn build<'a, I: Input>(
     watch: &Watch,
 ) -> Result<(BinaryTree, Pieces<'a, I>), BuildError> {
     let count = refs.refs.len();
-    // Every cut takes two new numbers at most.
-    let numbers = TriangleMesh::MAX_TRIANGLES.saturating_sub(input.len()) / 2;
+    let numbers = TriangleMesh::MAX_TRIANGLES.saturating_sub(input.len()) / NUMBERS;
     let budget = ((count as f64 * f64::from(fraction.max(0.0))) as usize).min(numbers);
     let mut pieces = Pieces::whole(input);
     if !I::CAN_SPLIT || budget == 0 || count <= LEAST {
@@ -67,25 +68,41 @@ pub(super) fn build<'a, I: Input>(
     }
     let levels = (count / LEAST).ilog2() as usize + 1;
     watch.phase(CUT, levels * count)?;
-    let mut upper = Upper {
-        pieces: &mut pieces,
+    let upper = Upper {
+        input,
         watch,
         scale: refs.scale(),
         least_overlap: OVERLAP * bounds_of(&refs.refs).half_area(),
-        parts: Vec::new(),
     };
-    let root = upper.grow(refs.refs, budget, 0);
-    let parts = upper.parts;
-    watch.phase(BUILT, parts[root].count)?;
-    let tree = finish(&pieces, root, parts, leaves, watch)?;
+    let part = Part {
+        refs: refs.refs,
+        known: Known::NONE,
+        first: input.len() as u32,
+        budget,
+        depth: 0,
+    };
+    let root = upper.grow(part);
+    watch.phase(BUILT, root.count)?;
+    let tree = finish(&mut pieces, root, leaves, watch)?;
     Ok((tree, pieces))
 }
 
 /// A part of the tree.
 enum Grown {
-    Inner([usize; 2]),
+    Inner {
+        /// What was cut here.
+        cut: Cuts,
+        sides: Box<[Counted; 2]>,
+    },
     /// What the other builder builds.
     Rest(Vec<Ref>),
+}
+
+/// Pieces that were made at one node.
+struct Cuts {
+    /// The number of the first.
+    first: u32,
+    pieces: Vec<Piece>,
 }
 
 /// A part and how many references it has.
@@ -94,196 +111,129 @@ struct Counted {
     count: usize,
 }
 
-struct Upper<'p, 'a, I> {
-    pieces: &'p mut Pieces<'a, I>,
-    watch: &'p Watch<'p>,
+/// What is to be grown.
+struct Part<'p> {
+    refs: Vec<Ref>,
+    /// What was cut above.
+    known: Known<'p>,
+    /// The first of the numbers of what is cut here and below.
+    first: u32,
+    /// How many references may be added. There are [`NUMBERS`] for each, so that those of other parts are known: they grow at
+    /// the same time.
+    budget: usize,
+    depth: u32,
+}
+
+/// What all of it needs.
+struct Upper<'u, I> {
+    input: &'u I,
+    watch: &'u Watch<'u>,
     scale: f32,
     /// Scaled, as all boxes of references are.
     least_overlap: f32,
-    parts: Vec<Counted>,
 }
 
-/// A cut through what it meets.
-#[derive(Clone, Copy)]
-struct Plane {
-    cost: f32,
-    axis: usize,
-    at: f32,
-    left: Bounds,
-    right: Bounds,
-    left_count: usize,
-    right_count: usize,
-}
-
-impl<I: Input> Upper<'_, '_, I> {
-    /// Grows the tree over `refs`: the place of its root among the parts.
-    fn grow(&mut self, refs: Vec<Ref>, budget: usize, depth: u32) -> usize {
+impl<I: Input> Upper<'_, I> {
+    /// Grows the tree over a part.
+    fn grow(&self, part: Part) -> Counted {
+        let Part {
+            refs,
+            known,
+            first,
+            budget,
+            depth,
+        } = part;
         let bounds = bounds_of(&refs);
         // What overlaps in there is no larger.
         let is_small = refs.len() <= LEAST || bounds.half_area() <= self.least_overlap;
         let go_on = self.watch.advance(refs.len());
         if is_small || budget == 0 || depth >= MAX_DEPTH || !go_on {
-            return self.rest(refs);
+            return rest(refs);
         }
         let Some(cut) = Cut::find(&refs, &bounds_of_centers(&refs)) else {
-            return self.rest(refs);
+            return rest(refs);
         };
-        let (left, right) = refs.iter().partition::<Vec<_>, _>(|r| cut.is_left(r));
+        let [left, right] = sides(&refs, |r| cut.is_left(r));
         let (left_bounds, right_bounds) = (bounds_of(&left), bounds_of(&right));
         let overlap = meet(left_bounds, right_bounds).map_or(0.0, |both| both.half_area());
-        let [left, right] = if overlap > self.least_overlap.max(bounds.half_area() * OVERLAP_HERE) {
+        let (mut both, mut cut) = ([left, right], Vec::new());
+        if overlap > self.least_overlap.max(bounds.half_area() * OVERLAP_HERE) {
             let large = bounds.half_area() * LARGE;
-            let (large, others) = refs
-                .iter()
-                .partition::<Vec<_>, _>(|r| r.bounds().half_area() > large);
+            let [large, others] = sides(&refs, |r| r.bounds().half_area() > large);
             if !large.is_empty() && large.len() <= others.len() / 4 {
-                let large = self.rest(large);
-                let others = self.grow(others, budget, depth + 1);
-                return self.inner([large, others]);
+                let others = Part {
+                    refs: others,
+                    known,
+                    first,
+                    budget,
+                    depth: depth + 1,
+                };
+                return inner(first, Vec::new(), [rest(large), self.grow(others)]);
             }
-            let cost = left_bounds.half_area() * left.len() as f32
-                + right_bounds.half_area() * right.len() as f32;
-            match self
-                .cheapest(&refs, &bounds)
-                .filter(|plane| plane.cost < cost)
-            {
-                Some(plane) => {
-                    let known = self.pieces.pieces.len();
-                    let sides = self.cut(&refs, plane, budget);
-                    if sides
-                        .iter()
-                        .all(|side| !side.is_empty() && side.len() < refs.len())
-                    {
-                        sides
-                    } else {
-                        // What was cut stays whole.
-                        self.pieces.pieces.truncate(known);
-                        [left, right]
-                    }
+            let cost = left_bounds.half_area() * both[0].len() as f32
+                + right_bounds.half_area() * both[1].len() as f32;
+            let corners = |r: &Ref| self.corners(&known, r);
+            let plane = planes::cheapest(&refs, &bounds, corners, self.watch);
+            if let Some(plane) = plane.filter(|plane| plane.cost < cost) {
+                let (sides, pieces) = self.cut(&refs, plane, &known, first, budget);
+                if sides
+                    .iter()
+                    .all(|side| !side.is_empty() && side.len() < refs.len())
+                {
+                    (both, cut) = (sides, pieces);
                 }
-                None => [left, right],
             }
-        } else {
-            [left, right]
-        };
-        let budget = budget.saturating_sub(left.len() + right.len() - refs.len());
+        }
         drop(refs);
+        let known = Known {
+            first,
+            pieces: &cut,
+            above: Some(&known),
+        };
+        let [left, right] = both;
+        let budget = budget - cut.len() / NUMBERS;
         let count = left.len() + right.len();
         let left_budget = (budget as u64 * left.len() as u64 / count as u64) as usize;
-        let left = self.grow(left, left_budget, depth + 1);
-        let right = self.grow(right, budget - left_budget, depth + 1);
-        self.inner([left, right])
-    }
-
-    fn rest(&mut self, refs: Vec<Ref>) -> usize {
-        self.parts.push(Counted {
-            count: refs.len(),
-            part: Grown::Rest(refs),
-        });
-        self.parts.len() - 1
-    }
-
-    fn inner(&mut self, sides: [usize; 2]) -> usize {
-        self.parts.push(Counted {
-            count: sides.iter().map(|&side| self.parts[side].count).sum(),
-            part: Grown::Inner(sides),
-        });
-        self.parts.len() - 1
-    }
-
-    /// The cheapest plane to cut at, of those between bins of equal width. Its boxes need not be exact.
-    #[inline(never)]
-    fn cheapest(&self, refs: &[Ref], bounds: &Bounds) -> Option<Plane> {
-        let mut best: Option<Plane> = None;
-        let mut bins = vec![[Bin::EMPTY; BINS]; 3];
-        let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
-        let width = [0, 1, 2].map(|axis| (high[axis] - low[axis]) / BINS as f32);
-        for (place, r) in refs.iter().enumerate() {
-            if place % (16 * STRIDE) == 0 {
-                self.watch.advance(0);
-            }
-            let whole = r.bounds();
-            let (min, max) = (whole.min.to_array(), whole.max.to_array());
-            let mut corners = None;
-            for (axis, bins) in bins.iter_mut().enumerate() {
-                // As close as this is one place to a scene whose size is about 1.
-                if width[axis] <= 1e-30 {
-                    continue;
-                }
-                let bin = |x: f32| (((x - low[axis]) / width[axis]) as usize).min(BINS - 1);
-                let (first, last) = (bin(min[axis]), bin(max[axis]));
-                bins[first].starts += 1;
-                bins[last].ends += 1;
-                if first == last {
-                    bins[first].bounds = bins[first].bounds.join(whole);
-                    continue;
-                }
-                let corners = *corners.get_or_insert_with(|| self.corners(r));
-                let mut from = Bounds::EMPTY;
-                for (place, bin) in bins.iter_mut().enumerate().take(last + 1).skip(first) {
-                    let start = low[axis] + width[axis] * place as f32;
-                    let end = start + width[axis];
-                    let to = section(&corners, axis, end);
-                    let mut part = from.join(to);
-                    for corner in corners {
-                        let x = corner.to_array()[axis];
-                        if (x >= start || place == 0) && (x <= end || place == BINS - 1) {
-                            part = part.join_point(corner);
-                        }
-                    }
-                    if let Some(part) = meet(part, whole) {
-                        bin.bounds = bin.bounds.join(part);
-                    }
-                    from = to;
-                }
-            }
-        }
-        for (axis, bins) in bins.iter().enumerate() {
-            let mut rights = [(Bounds::EMPTY, 0); BINS];
-            let (mut right, mut right_count) = (Bounds::EMPTY, 0);
-            for place in (1..BINS).rev() {
-                right = right.join(bins[place].bounds);
-                right_count += bins[place].ends;
-                rights[place] = (right, right_count);
-            }
-            let (mut left, mut left_count) = (Bounds::EMPTY, 0);
-            for place in 1..BINS {
-                left = left.join(bins[place - 1].bounds);
-                left_count += bins[place - 1].starts;
-                let (right, right_count) = rights[place];
-                if left_count == 0 || right_count == 0 {
-                    continue;
-                }
-                let cost =
-                    left.half_area() * left_count as f32 + right.half_area() * right_count as f32;
-                if cost < best.map_or(f32::INFINITY, |best| best.cost) {
-                    best = Some(Plane {
-                        cost,
-                        axis,
-                        at: low[axis] + width[axis] * place as f32,
-                        left,
-                        right,
-                        left_count,
-                        right_count,
-                    });
-                }
-            }
-        }
-        best
+        let first_below = first + cut.len() as u32;
+        let worth_it = left.len().min(right.len()) > TASK;
+        let left = Part {
+            refs: left,
+            known,
+            first: first_below,
+            budget: left_budget,
+            depth: depth + 1,
+        };
+        let right = Part {
+            refs: right,
+            known,
+            first: first_below + (NUMBERS * left_budget) as u32,
+            budget: budget - left_budget,
+            depth: depth + 1,
+        };
+        let (left, right) = join(worth_it, || self.grow(left), || self.grow(right));
+        inner(first, cut, [left, right])
     }
 
     /// The corners of a triangle, scaled.
-    fn corners(&self, r: &Ref) -> [f32x4; 3] {
-        let id = self.pieces.primitive(r.id());
-        let corners = self.pieces.triangle(id).unwrap_or_default();
+    fn corners(&self, known: &Known, r: &Ref) -> [f32x4; 3] {
+        let id = known.piece(r.id()).map_or(r.id(), |piece| piece.id);
+        let corners = self.input.triangle(id).unwrap_or_default();
         corners.map(|corner| {
             let corner = corner * self.scale;
             f32x4::new([corner.x, corner.y, corner.z, 0.0])
         })
     }
 
-    /// Both sides of a plane. What it meets is cut, unless it is cheaper on one side as a whole.
-    fn cut(&mut self, refs: &[Ref], plane: Plane, mut budget: usize) -> [Vec<Ref>; 2] {
+    /// Both sides of a plane, and the pieces they have of what it meets, whose numbers begin at `first`. That is cut, unless it
+    /// is cheaper on one side as a whole.
+    fn cut(
+        &self,
+        refs: &[Ref],
+        plane: Plane,
+        known: &Known,
+        first: u32,
+        budget: usize,
+    ) -> ([Vec<Ref>; 2], Vec<Piece>) {
         let Plane {
             axis,
             at,
@@ -294,6 +244,7 @@ impl<I: Input> Upper<'_, '_, I> {
             ..
         } = plane;
         let (mut lefts, mut rights) = (Vec::new(), Vec::new());
+        let mut pieces = Vec::new();
         for &r in refs {
             let whole = r.bounds();
             if whole.max.to_array()[axis] <= at {
@@ -311,9 +262,14 @@ impl<I: Input> Upper<'_, '_, I> {
                 + right_area * right_count.saturating_sub(1) as f32;
             let all_right = left_area * left_count.saturating_sub(1) as f32
                 + with_right.half_area() * right_count as f32;
-            let is_cheaper = apart <= all_left.min(all_right) && budget > 0;
-            if is_cheaper && let Some([below, above]) = self.cut_one(&r, axis, at) {
-                budget -= 1;
+            let is_cheaper = apart <= all_left.min(all_right) && pieces.len() < NUMBERS * budget;
+            if is_cheaper && let Some(parts) = self.cut_one(&r, known, axis, at) {
+                let number = first + pieces.len() as u32;
+                let [below, above] = [0, 1].map(|side| {
+                    let bounds = Bounds::of(&parts[side].aabb);
+                    Ref::new(&bounds, number + side as u32).scaled(self.scale)
+                });
+                pieces.extend(parts);
                 lefts.push(below);
                 rights.push(above);
             } else if all_left <= all_right {
@@ -326,15 +282,16 @@ impl<I: Input> Upper<'_, '_, I> {
                 rights.push(r);
             }
         }
-        [lefts, rights]
+        ([lefts, rights], pieces)
     }
 
     /// Both parts of what a reference is to, if there are two.
-    fn cut_one(&mut self, r: &Ref, axis: usize, at: f32) -> Option<[Ref; 2]> {
-        let number = r.id();
-        let aabb = self.pieces.aabb(number);
-        let id = self.pieces.primitive(number);
-        let corners = self.pieces.triangle(id)?;
+    fn cut_one(&self, r: &Ref, known: &Known, axis: usize, at: f32) -> Option<[Piece; NUMBERS]> {
+        let (aabb, id) = match known.piece(r.id()) {
+            Some(&Piece { aabb, id }) => (aabb, id),
+            None => (self.input.aabb(r.id()), r.id()),
+        };
+        let corners = self.input.triangle(id)?;
         // Whatever is lost here of a denormal number, both parts have the same plane.
         let at = at / self.scale;
         if !(aabb.min[axis] < at && at < aabb.max[axis]) {
@@ -343,57 +300,34 @@ impl<I: Input> Upper<'_, '_, I> {
         let (mut below, mut above) = (aabb, aabb);
         below.max[axis] = at;
         above.min[axis] = at;
-        let below = clip(corners, &below)?;
-        let above = clip(corners, &above)?;
-        // Not in the place of what is cut, which is as it was if the cut is given up.
-        let below = self.pieces.add_piece(Piece { aabb: below, id });
-        let above = self.pieces.add_piece(Piece { aabb: above, id });
-        Some([below, above].map(|number| {
-            Ref::new(&Bounds::of(&self.pieces.aabb(number)), number).scaled(self.scale)
-        }))
+        let (below, above) = (clip(corners, &below)?, clip(corners, &above)?);
+        Some([below, above].map(|aabb| Piece { aabb, id }))
     }
 }
 
-/// What is between two planes.
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Bounds,
-    /// How many references begin here.
-    starts: usize,
-    /// How many end.
-    ends: usize,
-}
-
-impl Bin {
-    const EMPTY: Self = Self {
-        bounds: Bounds::EMPTY,
-        starts: 0,
-        ends: 0,
-    };
-}
-
-/// Around the line in which a triangle meets a plane.
-fn section(corners: &[f32x4; 3], axis: usize, at: f32) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-        let (a, b) = (corners[a], corners[b]);
-        let (from, to) = (a.to_array()[axis], b.to_array()[axis]);
-        if (from < at) != (to < at) {
-            let share = (at - from) / (to - from);
-            bounds = bounds.join_point(a + (b - a) * f32x4::splat(share));
-        }
+/// A part that is left to the other builder.
+fn rest(refs: Vec<Ref>) -> Counted {
+    Counted {
+        count: refs.len(),
+        part: Grown::Rest(refs),
     }
-    bounds
 }
 
-/// What two boxes share.
-fn meet(a: Bounds, b: Bounds) -> Option<Bounds> {
-    let both = Bounds {
-        min: a.min.fast_max(b.min),
-        max: a.max.fast_min(b.max),
-    };
-    let (min, max) = (both.min.to_array(), both.max.to_array());
-    (0..3).all(|axis| min[axis] <= max[axis]).then_some(both)
+/// A part over two, where pieces were made whose numbers begin at `first`.
+fn inner(first: u32, pieces: Vec<Piece>, sides: [Counted; 2]) -> Counted {
+    Counted {
+        count: sides[0].count + sides[1].count,
+        part: Grown::Inner {
+            cut: Cuts { first, pieces },
+            sides: Box::new(sides),
+        },
+    }
+}
+
+/// References for which something holds, and the others.
+fn sides(refs: &[Ref], holds: impl Fn(&Ref) -> bool) -> [Vec<Ref>; 2] {
+    let (holding, others) = refs.iter().partition(|r| holds(r));
+    [holding, others]
 }
 
 fn bounds_of(refs: &[Ref]) -> Bounds {
@@ -410,30 +344,46 @@ struct Job {
 
 /// Has what is left built, and puts all together.
 fn finish<I: Input>(
-    pieces: &Pieces<I>,
-    root: usize,
-    mut parts: Vec<Counted>,
+    pieces: &mut Pieces<I>,
+    mut root: Counted,
     leaves: Leaves,
     watch: &Watch,
 ) -> Result<BinaryTree, BuildError> {
     // In the order of `lay_out`.
     let mut jobs = Vec::new();
-    let mut todo = vec![(root, 0, 1)];
+    // Where pieces are now whose numbers begin at what is in their order.
+    let mut moved: Vec<(u32, usize)> = Vec::new();
+    let known = pieces.input.len();
+    let mut todo = vec![(&mut root, 0, 1)];
     while let Some((part, first, below)) = todo.pop() {
-        match &mut parts[part].part {
-            &mut Grown::Inner([left, right]) => {
-                let left_count = parts[left].count;
+        match &mut part.part {
+            Grown::Inner { cut, sides } => {
+                if !cut.pieces.is_empty() {
+                    moved.push((cut.first, known + pieces.pieces.len()));
+                    pieces.pieces.append(&mut cut.pieces);
+                }
+                let [left, right] = &mut **sides;
+                let left_count = left.count;
                 let below_right = below + 2 + 2 * left_count - 2;
                 todo.push((right, first + left_count, below_right));
                 todo.push((left, first, below + 2));
             }
-            Grown::Rest(refs) => jobs.push(Job {
-                refs: core::mem::take(refs),
-                first,
-                below,
-            }),
+            Grown::Rest(refs) => {
+                for r in refs.iter_mut().filter(|r| r.id() as usize >= known) {
+                    let after = moved.partition_point(|&(first, _)| first <= r.id());
+                    if let Some((first, place)) = after.checked_sub(1).map(|at| moved[at]) {
+                        *r = r.with_id((r.id() - first) + place as u32);
+                    }
+                }
+                jobs.push(Job {
+                    refs: core::mem::take(refs),
+                    first,
+                    below,
+                });
+            }
         }
     }
+    let pieces = &*pieces;
     let build =
         |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below, leaves, watch);
     #[cfg(feature = "rayon")]
@@ -448,15 +398,15 @@ fn finish<I: Input>(
     let order = jobs.iter().flat_map(|job| job.refs.iter().map(Ref::id));
     let order = order.collect();
     let mut built = built.into_iter();
-    let nodes = lay_out(parts[root].count, root, |part, _| match parts[part].part {
-        Grown::Inner([left, right]) => Part::Inner {
-            left,
-            right,
-            left_leaves: parts[left].count,
+    let nodes = lay_out(root.count, &root, |part, _| match &part.part {
+        Grown::Inner { sides, .. } => lay_out::Part::Inner {
+            left: &sides[0],
+            right: &sides[1],
+            left_leaves: sides[0].count,
         },
         Grown::Rest(_) => {
             watch.advance(STRIDE);
-            Part::Tree(built.next().unwrap_or_default())
+            lay_out::Part::Tree(built.next().unwrap_or_default())
         }
     });
     watch.advance(0);
