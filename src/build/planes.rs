@@ -5,12 +5,14 @@ use super::{
     refs::{Bounds, Ref},
 };
 use crate::simd::{Backend, Operation, Simd};
+use core::ops::Range;
 use wide::f32x4;
 
 /// 16 are sooner done, and a level that gains 9 % of nodes and leaves then gains 3.
 const BINS: usize = 32;
-/// What is longer than so many of them is shared out among them part by part; what is not goes whole to the two at most that
-/// it is in. From 1 on the trees are as good; at 1.5 a scan is built in five sixths of the time at 1.
+/// What is longer than so many of them is shared out among them part by part; what is not goes whole to the first that it is in
+/// and the last. At 1 trees are as good as if all were shared out. At 1.5 a scan is built in five sixths of the time; of six
+/// scenes one meets 1.02 times as many nodes a ray and 0.99 as many leaves.
 const LONG: f32 = 1.5;
 /// So many references are one task.
 #[cfg(feature = "rayon")]
@@ -50,9 +52,9 @@ pub(super) fn cheapest(
         use rayon::prelude::*;
         let bins = refs.par_chunks(CHUNK).map(fill);
         let bins = bins.reduce(|| Bins::EMPTY, |a, b| a.join(&b));
-        return grid.cheapest(&bins);
+        return grid.cheapest(&bins, refs.len());
     }
-    grid.cheapest(&fill(refs))
+    grid.cheapest(&fill(refs), refs.len())
 }
 
 /// What is between two planes of each axis.
@@ -117,22 +119,52 @@ impl Grid {
         bins.fast_min(last).fast_trunc_int().to_array()
     }
 
-    /// The cheapest of the planes between bins.
-    fn cheapest(&self, bins: &Bins) -> Option<Plane> {
+    /// Shares a triangle out among bins of an axis.
+    #[inline(always)]
+    fn share(
+        &self,
+        bins: &mut [Bounds; BINS],
+        axis: usize,
+        whole: Bounds,
+        corners: [f32x4; 3],
+        between: Range<usize>,
+    ) {
+        let (low, width) = (self.low.to_array()[axis], self.width.to_array()[axis]);
+        let mut from = Bounds::EMPTY;
+        for place in between {
+            let start = low + width * place as f32;
+            let end = start + width;
+            let to = section(&corners, axis, end);
+            let mut part = from.join(to);
+            for corner in corners {
+                let x = corner.to_array()[axis];
+                if (x >= start || place == 0) && (x <= end || place == BINS - 1) {
+                    part = part.join_point(corner);
+                }
+            }
+            if let Some(part) = meet(part, whole)
+                && let Some(bounds) = bins.get_mut(place)
+            {
+                *bounds = bounds.join(part);
+            }
+            from = to;
+        }
+    }
+
+    /// The cheapest of the planes between bins, which `count` references are in.
+    fn cheapest(&self, bins: &Bins, count: usize) -> Option<Plane> {
         let mut best: Option<Plane> = None;
         let (low, width) = (self.low.to_array(), self.width.to_array());
         for axis in 0..3 {
             let (starts, ends) = (&bins.starts[axis], &bins.ends[axis]);
-            // What is in two bins was added whole to both.
+            // What is in several was added whole.
             let mut bounds = bins.bounds[axis];
             for (place, bounds) in bounds.iter_mut().enumerate() {
-                let (mut min, mut max) = (bounds.min.to_array(), bounds.max.to_array());
                 let start = low[axis] + width[axis] * place as f32;
-                min[axis] = min[axis].max(start);
-                max[axis] = max[axis].min(start + width[axis]);
+                let (min, max) = (bounds.min.to_array()[axis], bounds.max.to_array()[axis]);
                 *bounds = Bounds {
-                    min: f32x4::new(min),
-                    max: f32x4::new(max),
+                    min: with_lane(bounds.min, axis, min.max(start)),
+                    max: with_lane(bounds.max, axis, max.min(start + width[axis])),
                 };
             }
             let mut rights = [(Bounds::EMPTY, 0); BINS];
@@ -146,9 +178,16 @@ impl Grid {
             for place in 1..BINS {
                 left = left.join(bounds[place - 1]);
                 left_count += starts[place - 1] as usize;
-                let (right, right_count) = rights[place];
+                let (mut right, right_count) = rights[place];
                 if left_count == 0 || right_count == 0 {
                     continue;
+                }
+                let at = low[axis] + width[axis] * place as f32;
+                // What the plane meets may be in no bin beside it, but reaches it from both sides.
+                let (mut left, meets_any) = (left, left_count + right_count > count);
+                if meets_any {
+                    left.max = with_lane(left.max, axis, at);
+                    right.min = with_lane(right.min, axis, at);
                 }
                 let cost =
                     left.half_area() * left_count as f32 + right.half_area() * right_count as f32;
@@ -156,7 +195,7 @@ impl Grid {
                     best = Some(Plane {
                         cost,
                         axis,
-                        at: low[axis] + width[axis] * place as f32,
+                        at,
                         left,
                         right,
                         left_count,
@@ -226,38 +265,11 @@ impl<C: Fn(&Ref) -> [f32x4; 3]> Operation for Fill<'_, C> {
     }
 }
 
-impl Grid {
-    /// Shares a triangle out among bins of an axis.
-    #[inline(always)]
-    fn share(
-        &self,
-        bins: &mut [Bounds; BINS],
-        axis: usize,
-        whole: Bounds,
-        corners: [f32x4; 3],
-        between: core::ops::Range<usize>,
-    ) {
-        let (low, width) = (self.low.to_array()[axis], self.width.to_array()[axis]);
-        let mut from = Bounds::EMPTY;
-        for place in between {
-            let start = low + width * place as f32;
-            let end = start + width;
-            let to = section(&corners, axis, end);
-            let mut part = from.join(to);
-            for corner in corners {
-                let x = corner.to_array()[axis];
-                if (x >= start || place == 0) && (x <= end || place == BINS - 1) {
-                    part = part.join_point(corner);
-                }
-            }
-            if let Some(part) = meet(part, whole)
-                && let Some(bounds) = bins.get_mut(place)
-            {
-                *bounds = bounds.join(part);
-            }
-            from = to;
-        }
-    }
+/// The same but for a lane.
+fn with_lane(vector: f32x4, lane: usize, x: f32) -> f32x4 {
+    let mut lanes = vector.to_array();
+    lanes[lane] = x;
+    f32x4::new(lanes)
 }
 
 /// Around the line in which a triangle meets a plane.
