@@ -4,7 +4,14 @@
 
 use super::{Batch, Built, Chosen, Engine, Takes, timed};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use std::{cell::RefCell, error::Error, marker::PhantomData, rc::Rc};
+use std::{
+    cell::RefCell,
+    collections::BTreeMap,
+    error::Error,
+    marker::PhantomData,
+    rc::Rc,
+    sync::{Arc, Mutex, PoisonError},
+};
 use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
@@ -103,8 +110,16 @@ fn build<N: WideNode + Send>(
     Ok((Rc::new(RefCell::new(tree)), built))
 }
 
-pub(super) fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
-    ThreadPoolBuilder::new().num_threads(threads).build()
+/// So many threads: the same ones each time, as Embree's are. New ones would begin with memory that nobody has used.
+pub(super) fn pool(threads: usize) -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
+    static POOLS: Mutex<BTreeMap<usize, Arc<ThreadPool>>> = Mutex::new(BTreeMap::new());
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pool) = pools.get(&threads) {
+        return Ok(Arc::clone(pool));
+    }
+    let pool = Arc::new(ThreadPoolBuilder::new().num_threads(threads).build()?);
+    pools.insert(threads, Arc::clone(&pool));
+    Ok(pool)
 }
 
 /// How rays are handed over.
