@@ -6,7 +6,7 @@ use crate::{
     simd::{Lanes, Simd, Vector, splat3},
 };
 
-const MOST: usize = TriangleLeaf::MAX_VERTICES;
+const MOST: u32 = TriangleLeaf::MAX_VERTICES as u32;
 
 /// Where a triangle's vertices are. The fourth of each is 0.
 #[derive(Clone, Copy)]
@@ -78,7 +78,7 @@ impl<S: Simd> Filling<S> {
         let at_b = self.vertices + u32::from(is_new[0]);
         let at_c = at_b + u32::from(is_new[1]);
         let vertices = at_c + u32::from(is_new[2]);
-        if vertices > MOST as u32 || self.triangles == TriangleLeaf::MAX_TRIANGLES {
+        if vertices > MOST || self.triangles == TriangleLeaf::MAX_TRIANGLES {
             return false;
         }
         let new = [

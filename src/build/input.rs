@@ -146,12 +146,10 @@ impl Triangles<'_> {
         self.0.indices()[id as usize].map(|vertex| self.corner(vertex))
     }
 
-    /// The box around three vertices. The sum turns -0.0 into 0.0, so that the order of joins never shows.
+    /// The box around three vertices.
     #[inline(always)]
     fn aabb_of(&self, vertices: [u32; 3]) -> Aabb {
-        let [a, b, c] = vertices.map(|vertex| Vec3A::from(self.corner(vertex)));
-        let (min, max) = (a.min(b).min(c) + 0.0, a.max(b).max(c) + 0.0);
-        Aabb::new(min.into(), max.into())
+        Self::bounds(&self.load_from(vertices)).aabb()
     }
 
     /// The first corner that is not finite.

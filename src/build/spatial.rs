@@ -90,19 +90,13 @@ pub(super) fn build<'a, I: Input>(
 /// A part of the tree.
 enum Grown {
     Inner {
-        /// What was cut here.
-        cut: Cuts,
+        /// What was made here of what is cut, and the number of the first.
+        pieces: Vec<Piece>,
+        first: u32,
         sides: Box<[Counted; 2]>,
     },
     /// What the other builder builds.
     Rest(Vec<Ref>),
-}
-
-/// Pieces that were made at one node.
-struct Cuts {
-    /// The number of the first.
-    first: u32,
-    pieces: Vec<Piece>,
 }
 
 /// A part and how many references it has.
@@ -318,7 +312,8 @@ fn inner(first: u32, pieces: Vec<Piece>, sides: [Counted; 2]) -> Counted {
     Counted {
         count: sides[0].count + sides[1].count,
         part: Grown::Inner {
-            cut: Cuts { first, pieces },
+            pieces,
+            first,
             sides: Box::new(sides),
         },
     }
@@ -357,10 +352,14 @@ fn finish<I: Input>(
     let mut todo = vec![(&mut root, 0, 1)];
     while let Some((part, first, below)) = todo.pop() {
         match &mut part.part {
-            Grown::Inner { cut, sides } => {
-                if !cut.pieces.is_empty() {
-                    moved.push((cut.first, known + pieces.pieces.len()));
-                    pieces.pieces.append(&mut cut.pieces);
+            Grown::Inner {
+                pieces: here,
+                first: number,
+                sides,
+            } => {
+                if !here.is_empty() {
+                    moved.push((*number, known + pieces.pieces.len()));
+                    pieces.pieces.append(here);
                 }
                 let [left, right] = &mut **sides;
                 let left_count = left.count;
