@@ -104,6 +104,11 @@ impl<const W: usize> Shape<W> for Collapse<'_, W> {
         self.entries[node].is_leaf
     }
 
+    /// As the binary node.
+    fn leaf(&self, node: usize) -> u32 {
+        node as u32
+    }
+
     fn below(&self, node: usize) -> [usize; 2] {
         self.nodes[node].children()
     }

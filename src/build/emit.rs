@@ -4,19 +4,19 @@ use super::{
     BuildError,
     binary::BinaryTree,
     collapse::Collapse,
-    cost::Measure,
     cuts::Cuts,
     input::{Input, leaf_of},
     monitor::Watch,
     pages,
+    walk::{Walked, walk},
 };
 use crate::{
     geometry::Aabb,
-    layout::{Child, LayoutError, STACK, WideNode},
-    simd::{Backend, Operation, Simd},
+    layout::{LayoutError, WideNode},
+    simd::{Backend, Simd},
 };
 use bytemuck::Zeroable;
-use core::{marker::PhantomData, ops::Range};
+use core::ops::Range;
 use std::vec::Vec;
 
 /// The parts that [`Bvh::from_parts`](crate::layout::Bvh::from_parts) takes.
@@ -37,6 +37,8 @@ pub(super) trait Shape<const W: usize> {
     fn aabb(&self, node: usize) -> &Aabb;
     /// Whether a node becomes a leaf.
     fn is_leaf(&self, node: usize) -> bool;
+    /// What a node that becomes a leaf is called.
+    fn leaf(&self, node: usize) -> u32;
     /// The two children of a binary node.
     fn below(&self, node: usize) -> [usize; 2];
     /// How the cheapest forests below a node are made.
@@ -85,8 +87,11 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
     collapse: &Collapse<W>,
     watch: &Watch,
 ) -> Result<Parts<N, I::Leaf>, BuildError> {
-    let mut ranges = Vec::new();
-    let nodes = walk(collapse, watch, |leaf| ranges.push(collapse.places(leaf)))?;
+    let Walked { nodes, leaves } = walk(collapse, watch)?;
+    let ranges = leaves
+        .into_iter()
+        .map(|leaf| collapse.places(leaf as usize));
+    let ranges: Vec<_> = ranges.collect();
     let (leaves, primitives) = fill(input, tree.order(), &ranges, watch)?;
     watch.check()?;
     let bounds = tree.nodes().first().map_or(Aabb::EMPTY, |root| root.aabb);
@@ -96,119 +101,6 @@ pub(super) fn emit<N: WideNode, I: Input, const W: usize>(
         primitives,
         bounds,
     })
-}
-
-/// The wide nodes, in the layout's order; `leaf` is told of the binary ones that become leaves, in theirs.
-///
-/// # Errors
-/// As [`emit`].
-pub(super) fn walk<N: WideNode, const W: usize>(
-    shape: &impl Shape<W>,
-    watch: &Watch,
-    leaf: impl FnMut(usize),
-) -> Result<Vec<N>, BuildError> {
-    Backend::detect().run(Walk {
-        shape,
-        watch,
-        leaf,
-        nodes: PhantomData,
-    })
-}
-
-struct Walk<'a, N, T, F, const W: usize> {
-    shape: &'a T,
-    watch: &'a Watch<'a>,
-    leaf: F,
-    nodes: PhantomData<N>,
-}
-
-impl<N: WideNode, T: Shape<W>, F: FnMut(usize), const W: usize> Operation for Walk<'_, N, T, F, W> {
-    type Output = Result<Vec<N>, BuildError>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, token: S) -> Self::Output {
-        let Self {
-            shape,
-            watch,
-            mut leaf,
-            ..
-        } = self;
-        if shape.len() == 0 {
-            return Ok(Vec::new());
-        }
-        // Most trees have more than four leaves a wide node. What is not used is not touched.
-        let mut nodes = pages::with_capacity(shape.len() / 8 + 1);
-        let mut leaves = 0;
-        let root = shape.root();
-        let measure = Measure::of_bounds(shape.aabb(root));
-        // Binary nodes that become wide ones, their places, and the stack in use when a walk gets there.
-        let mut todo = Vec::new();
-        if shape.is_leaf(root) {
-            leaf(root);
-        } else {
-            nodes.push(N::zeroed());
-            todo.push((root, 0, 0));
-        }
-        while let Some((node, place, used)) = todo.pop() {
-            let (children, count) = shape.children(node);
-            let used = used + count - 1;
-            if used >= STACK {
-                return Err(LayoutError::TooDeep(place).into());
-            }
-            // The likeliest first: its nodes follow, close by.
-            let mut areas = [0.0; W];
-            for (area, &child) in areas.iter_mut().zip(&children[..count]) {
-                *area = measure.half_area(shape.aabb(child));
-            }
-            let mut lanes = [0; W];
-            for (child, place) in children.into_iter().zip(places_by_size(&areas)) {
-                lanes[place as usize % W] = child;
-            }
-            if N::NODES_FIRST {
-                lanes[..count].sort_by_key(|&child| shape.is_leaf(child));
-            }
-            let (known, first) = (todo.len(), nodes.len());
-            let lanes = lanes[..count].iter().map(|&child| {
-                let link = if shape.is_leaf(child) {
-                    leaf(child);
-                    leaves += 1;
-                    Child::leaf(leaves - 1)
-                } else {
-                    let place = first + todo.len() - known;
-                    todo.push((child, place, used));
-                    shape.fetch(token, child);
-                    Child::node(place as u32)
-                };
-                (*shape.aabb(child), link)
-            });
-            nodes[place] = N::from_children(lanes);
-            nodes.resize(first + todo.len() - known, N::zeroed());
-            todo[known..].reverse();
-            if !watch.advance(count) {
-                return Err(BuildError::Cancelled);
-            }
-        }
-        nodes.shrink_to_fit();
-        Ok(nodes)
-    }
-}
-
-/// The place of each size, none negative, the greatest first; of those that are nearly equal the first. Each is compared
-/// with all: which is greater is a toss-up.
-#[inline(always)]
-fn places_by_size<const W: usize>(sizes: &[f32; W]) -> [u32; W] {
-    const { assert!(W <= 8) };
-    let mut keys = [0; W];
-    for (lane, key) in keys.iter_mut().enumerate() {
-        *key = sizes[lane].to_bits() & !7 | (7 - lane as u32);
-    }
-    let mut places = [0; W];
-    for other in keys {
-        for (place, key) in places.iter_mut().zip(keys) {
-            *place += u32::from(other > key);
-        }
-    }
-    places
 }
 
 /// Leaves of ranges of the tree's order, and the list of primitives that they count in.

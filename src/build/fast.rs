@@ -2,14 +2,14 @@
 
 use super::{
     BuildError,
-    emit::{Parts, walk},
+    emit::Parts,
     input::Input,
     leaf_collapse::LeafCollapse,
     monitor::Watch,
-    morton::{self, Curve},
-    pages,
-    ploc::{self, Node},
-    runs::{self, Runs},
+    morton,
+    pages::{self, Slots},
+    sections::Sections,
+    walk::walk,
 };
 use crate::{
     geometry::Aabb,
@@ -18,10 +18,8 @@ use crate::{
 };
 use std::vec::Vec;
 
-/// So many primitives are one task, along the curve.
-const PART: usize = 1 << 12;
-/// One of so many clusters of a part is left for those of other parts to be joined with.
-const LEFT: usize = 16;
+/// So many leaves are copied in one go.
+const CHUNK: usize = 1 << 10;
 /// Leaves are fetched so many before they are copied: with children of children fetched by the walk, 3 % off the build.
 const AHEAD: usize = 12;
 
@@ -37,139 +35,58 @@ pub(super) fn build<N: WideNode, I: Input, const W: usize>(
     watch: &Watch,
 ) -> Result<(Parts<N, I::Leaf>, usize), BuildError> {
     let curve = morton::curve(input, drop_non_finite, watch)?;
-    let Grown { leaves, nodes, .. } = Grown::of(input, &curve, watch)?;
-    watch.phase(0.93, nodes.len())?;
-    let collapse = LeafCollapse::<W>::new::<I>(&nodes, watch);
+    let mut sections = Sections::grow::<I, W>(input, &curve, watch)?;
+    let (nodes, cuts) = sections.join::<I, W>(curve.measure, watch)?;
     watch.phase(1.0, nodes.len())?;
-    let mut order = Vec::with_capacity(leaves.len());
-    let wide = walk(&collapse, watch, |leaf| {
-        order.push(nodes[leaf].number() as u32);
-    })?;
-    // Not one by one in the walk, nor in place along cycles: each would wait for the one before.
-    let leaves = Backend::detect().run(InOrder {
-        all: &leaves,
-        order: &order,
-    });
+    let collapse = LeafCollapse::<W> {
+        nodes: &nodes,
+        cuts: &cuts,
+    };
+    let walked = walk(&collapse, watch)?;
     let parts = Parts {
-        nodes: wide,
-        leaves,
+        nodes: walked.nodes,
+        leaves: in_order(&sections, &walked.leaves),
         primitives: curve.order,
         bounds: nodes.last().map_or(Aabb::EMPTY, |root| root.aabb),
     };
     Ok((parts, curve.dropped))
 }
 
-/// Copies of all at the places of an order.
-struct InOrder<'a, T> {
-    all: &'a [T],
-    order: &'a [u32],
+/// The leaves of these numbers. They are not copied one by one in the walk, nor put in place along cycles: each would
+/// wait for the one before.
+fn in_order<L: Copy + Send + Sync>(sections: &Sections<L>, order: &[u32]) -> Vec<L> {
+    let backend = Backend::detect();
+    pages::made(order.len(), CHUNK, |first, to| {
+        backend.run(Copies {
+            sections,
+            order: &order[first..],
+            to,
+        });
+    })
 }
 
-impl<T: Copy> Operation for InOrder<'_, T> {
-    type Output = Vec<T>;
+struct Copies<'a, 's, L> {
+    sections: &'a Sections<L>,
+    /// Of those that are copied, and of those after them.
+    order: &'a [u32],
+    to: &'a mut Slots<'s, L>,
+}
+
+impl<L: Copy> Operation for Copies<'_, '_, L> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, token: S) -> Vec<T> {
-        let mut copies = pages::with_capacity(self.order.len());
-        for (index, &place) in self.order.iter().enumerate() {
-            if let Some(&later) = self.order.get(index + AHEAD) {
-                token.prefetch((&raw const self.all[later as usize]).cast());
+    fn run<S: Simd>(self, token: S) {
+        let Self {
+            sections,
+            order,
+            to,
+        } = self;
+        for index in 0..to.left() {
+            if let Some(&later) = order.get(index + AHEAD) {
+                token.prefetch((&raw const *sections.leaf(later)).cast());
             }
-            copies.push(self.all[place as usize]);
+            to.push(*sections.leaf(order[index]));
         }
-        copies
-    }
-}
-
-/// Leaves and the tree over them.
-struct Grown<L> {
-    leaves: Vec<L>,
-    /// The root last.
-    nodes: Vec<Node>,
-    /// What is not joined yet.
-    roots: Vec<u32>,
-}
-
-impl<L: Copy + Send> Grown<L> {
-    /// Room for what comes of so many primitives; seldom it takes more. What is not used is not touched.
-    fn with_room(primitives: usize) -> Self {
-        let leaves = primitives / 8 * 3 + 1;
-        Self {
-            leaves: pages::with_capacity(leaves),
-            nodes: pages::with_capacity(2 * leaves),
-            roots: Vec::new(),
-        }
-    }
-
-    /// Over all that is on the curve.
-    ///
-    /// # Errors
-    /// The build was cancelled.
-    fn of<I: Input<Leaf = L>>(input: &I, curve: &Curve, watch: &Watch) -> Result<Self, BuildError> {
-        let &Curve {
-            ref order, scale, ..
-        } = curve;
-        watch.phase(0.8, 2 * order.len())?;
-        let mut all = Self::with_room(order.len());
-        #[cfg(feature = "rayon")]
-        if rayon::current_num_threads() > 1 {
-            use rayon::prelude::*;
-            let part = |(index, ids): (usize, &[u32])| {
-                let mut part = Self::with_room(ids.len());
-                part.grow(input, ids, index * PART, scale, watch);
-                part
-            };
-            let parts: Vec<_> = order.par_chunks(PART).enumerate().map(part).collect();
-            parts.iter().for_each(|part| all.append(part));
-            return all.finish(scale, watch);
-        }
-        for (ids, first) in order.chunks(PART).zip((0..).step_by(PART)) {
-            all.grow(input, ids, first, scale, watch);
-        }
-        all.finish(scale, watch)
-    }
-
-    /// Adds a part: joined apart from the rest, it is on one core, and in its cache.
-    fn grow<I: Input<Leaf = L>>(
-        &mut self,
-        input: &I,
-        ids: &[u32],
-        first: usize,
-        scale: f32,
-        watch: &Watch,
-    ) {
-        if !watch.advance(ids.len()) {
-            return;
-        }
-        let start = self.nodes.len() as u32;
-        let runs = Runs {
-            leaves: &mut self.leaves,
-            nodes: &mut self.nodes,
-        };
-        runs::cut(input, ids, first, scale, runs);
-        let clusters: Vec<_> = (start..self.nodes.len() as u32).collect();
-        let until = clusters.len() / LEFT;
-        let roots = ploc::join(&mut self.nodes, clusters, until, scale, watch);
-        self.roots.extend(roots);
-    }
-
-    /// Adds a part that was grown elsewhere.
-    #[cfg(feature = "rayon")]
-    fn append(&mut self, part: &Self) {
-        let (leaves, nodes) = (self.leaves.len() as u32, self.nodes.len() as u32);
-        self.roots
-            .extend(part.roots.iter().map(|root| root + nodes));
-        let after = part.nodes.iter().map(|node| node.after(leaves, nodes));
-        self.nodes.extend(after);
-        self.leaves.extend_from_slice(&part.leaves);
-    }
-
-    /// Joins what is left.
-    fn finish(mut self, scale: f32, watch: &Watch) -> Result<Self, BuildError> {
-        let roots = core::mem::take(&mut self.roots);
-        watch.phase(0.9, roots.len())?;
-        ploc::join(&mut self.nodes, roots, 1, scale, watch);
-        watch.check()?;
-        Ok(self)
     }
 }

@@ -29,7 +29,7 @@ pub(super) enum Verdict {
 
 /// Primitives, by number, and the leaves they go into.
 pub(super) trait Input: Sync {
-    type Leaf: Leaf + Send;
+    type Leaf: Leaf + Send + Sync;
     /// A leaf while it is filled, in a backend's vectors.
     type Filling<S: Simd>: Copy;
     /// Where what a leaf has of a primitive is.

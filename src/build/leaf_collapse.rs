@@ -1,13 +1,12 @@
 //! The cheapest collapse of a tree whose leaves stay what they are: as [`collapse`](super::collapse), but for speed.
 //!
-//! The costs of a node's forests are needed for its parent's, and then no more. What is kept is how each is made.
+//! What is kept of a node's forests is how each is made: their costs are needed for its parent's, and then no more.
 
 use super::{
     cost::{self, Measure},
     cuts::{Cuts, Forest, Joined, MAX_WIDTH},
     emit::Shape,
     input::Input,
-    monitor::{STRIDE, Watch},
     pages,
     ploc::Node,
 };
@@ -18,23 +17,24 @@ use crate::{
 use core::marker::PhantomData;
 use std::vec::Vec;
 
-/// The cheapest collapse to nodes `W` wide.
+/// The cheapest collapse to nodes `W` wide: a tree, and how its forests are made.
 pub(super) struct LeafCollapse<'a, const W: usize> {
-    nodes: &'a [Node],
-    cuts: Vec<Cuts>,
+    pub nodes: &'a [Node],
+    pub cuts: &'a [Cuts],
 }
 
-impl<'a, const W: usize> LeafCollapse<'a, W> {
-    pub fn new<I: Input>(nodes: &'a [Node], watch: &Watch) -> Self {
-        let bounds = nodes.last().map_or(Aabb::EMPTY, |root| root.aabb);
-        let cuts = Backend::detect().run(Solve::<I, W> {
-            nodes,
-            measure: Measure::of_bounds(&bounds),
-            watch,
-            input: PhantomData,
-        });
-        Self { nodes, cuts }
-    }
+/// The forests of all nodes, of which the first are known, and how the others are made. A node comes after those below it.
+pub(super) fn solve<I: Input, const W: usize>(
+    nodes: &[Node],
+    forests: Vec<Forest>,
+    measure: Measure,
+) -> (Vec<Forest>, Vec<Cuts>) {
+    Backend::detect().run(Solve::<I, W> {
+        nodes,
+        forests,
+        measure,
+        input: PhantomData,
+    })
 }
 
 impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
@@ -54,6 +54,12 @@ impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
     #[inline(always)]
     fn is_leaf(&self, node: usize) -> bool {
         self.nodes[node].is_leaf()
+    }
+
+    /// By its number.
+    #[inline(always)]
+    fn leaf(&self, node: usize) -> u32 {
+        self.nodes[node].number() as u32
     }
 
     #[inline(always)]
@@ -76,36 +82,42 @@ impl<const W: usize> Shape<W> for LeafCollapse<'_, W> {
 
 struct Solve<'a, I, const W: usize> {
     nodes: &'a [Node],
+    forests: Vec<Forest>,
     measure: Measure,
-    watch: &'a Watch<'a>,
     input: PhantomData<I>,
 }
 
 impl<I: Input, const W: usize> Operation for Solve<'_, I, W> {
-    type Output = Vec<Cuts>;
+    type Output = (Vec<Forest>, Vec<Cuts>);
 
     /// Every node after those below it.
     #[inline(always)]
-    fn run<S: Simd>(self, token: S) -> Vec<Cuts> {
-        let mut forests = pages::with_capacity::<Forest>(self.nodes.len());
-        let mut all = pages::with_capacity(self.nodes.len());
-        for nodes in self.nodes.chunks(STRIDE) {
-            self.watch.advance(nodes.len());
-            for node in nodes {
-                let area = self.measure.half_area(&node.aabb);
-                if node.is_leaf() {
-                    forests.push([area * I::leaf_cost(node.count()); MAX_WIDTH]);
-                    all.push(Cuts::NONE);
-                    continue;
-                }
-                let [left, right] = node.children();
-                let joined = Joined::new::<W>(token, &forests[left], &forests[right]);
-                let whole = joined.most::<W>() + area * cost::NODE;
-                let (forest, cuts) = joined.below::<W>(token, whole);
-                forests.push(forest);
-                all.push(cuts);
-            }
+    fn run<S: Simd>(self, token: S) -> Self::Output {
+        let Self {
+            nodes,
+            forests: mut all,
+            measure,
+            ..
+        } = self;
+        let nodes = &nodes[all.len()..];
+        if all.is_empty() {
+            all = pages::with_capacity(nodes.len());
         }
-        all
+        let mut all_cuts = pages::with_capacity(nodes.len());
+        for node in nodes {
+            let area = measure.half_area(&node.aabb);
+            if node.is_leaf() {
+                all.push([area * I::leaf_cost(node.count()); MAX_WIDTH]);
+                all_cuts.push(Cuts::NONE);
+                continue;
+            }
+            let [left, right] = node.children();
+            let joined = Joined::new::<W>(token, &all[left], &all[right]);
+            let whole = joined.most::<W>() + area * cost::NODE;
+            let (forest, cuts) = joined.below::<W>(token, whole);
+            all.push(forest);
+            all_cuts.push(cuts);
+        }
+        (all, all_cuts)
     }
 }

@@ -20,14 +20,14 @@
 // 3. `reinsertion`: subtrees are moved to where they cost least.
 // 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`; `cuts`, how.
 // 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
-// 6. `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
+// 6. `walk`, `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
 //
 // `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
 //
-// 1. `morton`: the primitives along a curve.
-// 2. `runs`: leaves of what follows each other.
-// 3. `ploc`: the binary tree over leaves, from the bottom up.
-// 4. `leaf_collapse`: as 4 above; then the walk of `emit`.
+// 1. `morton`, `radix`: the primitives along a curve.
+// 2. `sections` of the curve, each by itself: `runs`, leaves of what follows each other; `ploc`, the binary tree over
+//    leaves, from the bottom up; `leaf_collapse`, as 4 above. Then their trees are joined.
+// 3. `walk`, as of 6.
 //
 // `refit` makes boxes anew when primitives have moved; `reorder` puts a mesh in the order of leaves.
 //
@@ -60,6 +60,7 @@ mod pipeline;
 mod planes;
 mod ploc;
 mod preset;
+mod radix;
 mod rebalance;
 mod refit;
 mod refs;
@@ -67,11 +68,13 @@ mod reinsertion;
 mod reorder;
 mod report;
 mod runs;
+mod sections;
 mod spatial;
 mod split;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod walk;
 
 pub use binary::{BinaryNode, BinaryTree, TreeError};
 pub use builder::Builder;

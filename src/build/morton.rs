@@ -4,20 +4,20 @@
 
 use super::{
     BuildError,
+    cost::Measure,
     input::Input,
     monitor::Watch,
-    pages,
+    radix::sorted,
     refs::{Bounds, gather},
 };
 use std::vec::Vec;
 use wide::f32x4;
 
-/// Bits of a code along each axis, and of a digit of the sort.
-const BITS: u32 = 11;
-const CELLS: usize = 1 << BITS;
-const DIGITS: usize = 3;
+/// Bits of a code along each axis.
+pub(super) const BITS: u32 = 11;
+pub(super) const CELLS: usize = 1 << BITS;
 /// The bits below the code: a primitive's number, of which there are no more than 2^30.
-const ID_BITS: u32 = 30;
+pub(super) const ID_BITS: u32 = 30;
 
 /// Each number with two zeros after every bit.
 const SPREAD: [u32; CELLS] = {
@@ -87,7 +87,7 @@ pub(super) struct Curve {
     pub order: Vec<u32>,
     /// How many are not finite and were left out.
     pub dropped: usize,
-    pub scale: f32,
+    pub measure: Measure,
 }
 
 /// The curve through the centers of the boxes of all primitives that have a place in the tree.
@@ -114,61 +114,8 @@ pub(super) fn curve<I: Input>(
     Ok(Curve {
         order: sorted(gathered.all),
         dropped: gathered.dropped,
-        scale: gathered.bounds.measure().scale(),
+        measure: gathered.bounds.measure(),
     })
-}
-
-fn id(key: u64) -> u32 {
-    key as u32 & ((1 << ID_BITS) - 1)
-}
-
-/// The numbers in keys, which are in order below the code, in the order of keys.
-fn sorted(mut keys: Vec<u64>) -> Vec<u32> {
-    #[cfg(feature = "rayon")]
-    if rayon::current_num_threads() > 3 {
-        use rayon::slice::ParallelSliceMut;
-        keys.par_sort_unstable();
-        return keys.into_iter().map(id).collect();
-    }
-    let mut counts = [[0u32; CELLS]; DIGITS];
-    for &key in &keys {
-        for (place, counts) in counts.iter_mut().enumerate() {
-            counts[digit(key, place)] += 1;
-        }
-    }
-    let mut other = pages::filled(0, keys.len());
-    let [low, middle, high] = counts;
-    sort_by_digit(0, low, &keys, &mut other, |key| key);
-    sort_by_digit(1, middle, &other, &mut keys, |key| key);
-    drop(other);
-    let mut order = pages::filled(0, keys.len());
-    sort_by_digit(2, high, &keys, &mut order, id);
-    order
-}
-
-#[inline(always)]
-fn digit(key: u64, place: usize) -> usize {
-    (key >> (ID_BITS + BITS * place as u32)) as usize & (CELLS - 1)
-}
-
-/// Puts what is made of keys in the order of a digit, of which it is counted how often each is there.
-#[inline(always)]
-fn sort_by_digit<T>(
-    place: usize,
-    mut counts: [u32; CELLS],
-    keys: &[u64],
-    to: &mut [T],
-    make: impl Fn(u64) -> T,
-) {
-    let mut next = 0;
-    for count in &mut counts {
-        next += core::mem::replace(count, next);
-    }
-    for &key in keys {
-        let count = &mut counts[digit(key, place)];
-        to[*count as usize] = make(key);
-        *count += 1;
-    }
 }
 
 #[cfg(test)]

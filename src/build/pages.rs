@@ -3,6 +3,7 @@
 //! A ray in a large tree goes to a page or two for every node, and the processor remembers where some hundreds of small ones
 //! are. Linux gives large ones for the asking alone, wherever it is not set to give them always or never.
 
+use core::mem::MaybeUninit;
 use std::vec::Vec;
 
 /// An empty vector with room for so many, on large pages if the system has them.
@@ -13,10 +14,73 @@ pub(super) fn with_capacity<T>(capacity: usize) -> Vec<T> {
 }
 
 /// A vector of so many times `value`, on large pages if the system has them.
-pub(super) fn filled<T: Copy>(value: T, len: usize) -> Vec<T> {
+///
+/// With `rayon` all threads write it: for the system, too, new memory is work.
+pub(super) fn filled<T: Copy + Send>(value: T, len: usize) -> Vec<T> {
     let mut vector = with_capacity(len);
+    #[cfg(feature = "rayon")]
+    if len * size_of::<T>() >= LARGE && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        vector.par_extend(rayon::iter::repeat_n(value, len));
+        return vector;
+    }
     vector.resize(len, value);
     vector
+}
+
+/// So many bytes are worth more than one thread.
+#[cfg(feature = "rayon")]
+const LARGE: usize = 1 << 18;
+
+/// A vector of `len`, on large pages if the system has them, of which every `chunk` are made in one go, at once with others. `make` is
+/// told which is the first of them; if it makes less than there is room for, there is no vector.
+pub(super) fn made<T: Copy + Send>(
+    len: usize,
+    chunk: usize,
+    make: impl Fn(usize, &mut Slots<T>) + Sync,
+) -> Vec<T> {
+    let mut vector = with_capacity(len);
+    let make = |(index, slots): (usize, &mut [MaybeUninit<T>])| {
+        let mut slots = Slots { slots, written: 0 };
+        make(index * chunk, &mut slots);
+        slots.written == slots.slots.len()
+    };
+    let slots = &mut vector.spare_capacity_mut()[..len];
+    #[cfg(feature = "rayon")]
+    let all_made = {
+        use rayon::prelude::*;
+        slots.par_chunks_mut(chunk).enumerate().all(make)
+    };
+    #[cfg(not(feature = "rayon"))]
+    let all_made = slots.chunks_mut(chunk).enumerate().all(make);
+    if all_made {
+        // SAFETY: all chunks of so many, and every slot of each, have been written: it was asked above.
+        unsafe { vector.set_len(len) };
+    }
+    vector
+}
+
+/// Slots that are written one after the other.
+pub(super) struct Slots<'a, T> {
+    slots: &'a mut [MaybeUninit<T>],
+    written: usize,
+}
+
+impl<T> Slots<'_, T> {
+    /// How many are left.
+    #[inline(always)]
+    pub fn left(&self) -> usize {
+        self.slots.len() - self.written
+    }
+
+    /// Writes the next, if one is left.
+    #[inline(always)]
+    pub fn push(&mut self, value: T) {
+        if let Some(slot) = self.slots.get_mut(self.written) {
+            slot.write(value);
+            self.written += 1;
+        }
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -36,6 +36,8 @@ pub(super) struct Node {
 impl Node {
     const INNER: u32 = 1 << 31;
 
+    pub const NONE: Self = Self::leaf(Aabb::EMPTY, 0, 0);
+
     #[inline(always)]
     pub const fn leaf(aabb: Aabb, number: u32, count: u32) -> Self {
         Self {
@@ -68,20 +70,20 @@ impl Node {
         [self.first as usize, (self.second & !Self::INNER) as usize]
     }
 
-    /// The same after so many other leaves and nodes.
-    #[cfg(feature = "rayon")]
+    /// The same after so many other leaves, if it is one; else over the nodes that are where `place` says of its children.
     #[inline(always)]
-    pub const fn after(&self, leaves: u32, nodes: u32) -> Self {
-        match self.is_leaf() {
-            true => Self {
-                first: self.first + leaves,
-                ..*self
-            },
-            false => Self {
-                first: self.first + nodes,
-                second: self.second + nodes,
-                ..*self
-            },
+    pub fn moved(&self, leaves: u32, place: impl Fn(u32) -> u32) -> Self {
+        let (first, second) = match self.is_leaf() {
+            true => (self.first + leaves, self.second),
+            false => {
+                let second = self.second & !Self::INNER;
+                (place(self.first), place(second) | Self::INNER)
+            }
+        };
+        Self {
+            aabb: self.aabb,
+            first,
+            second,
         }
     }
 }

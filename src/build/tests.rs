@@ -1,9 +1,11 @@
 //! Whole builds, held to what every hierarchy must be.
 
 use super::{BinaryNode, BinaryTree, BuildError, Builder, Preset};
+#[cfg(feature = "rayon")]
+use crate::layout::{CompactNode4, CompactNode8};
 use crate::{
     geometry::{Aabb, Ray, TriangleMesh},
-    layout::{Bvh, Bvh8, ChildKind, Leaf, Node4, Node8, Owned, TriangleLeaf, WideNode},
+    layout::{Bvh, ChildKind, Leaf, Node4, Node8, Owned, TriangleLeaf, WideNode},
 };
 use core::ops::ControlFlow;
 use glam::Vec3;
@@ -204,11 +206,11 @@ fn check_mesh(positions: &[Position], indices: &[[u32; 3]]) {
     check_bvh(&builder.build_from_tree(&mesh, &tree).unwrap(), &all, aabb);
 }
 
-fn assert_same(a: &Bvh8, b: &Bvh8) {
+fn assert_same<N: WideNode>(a: &Bvh<N, TriangleLeaf, Owned>, b: &Bvh<N, TriangleLeaf, Owned>) {
     assert!(bytes_of(a) == bytes_of(b));
 }
 
-fn bytes_of(bvh: &Bvh8) -> (&[u8], &[u8], &[u32]) {
+fn bytes_of<N: WideNode>(bvh: &Bvh<N, TriangleLeaf, Owned>) -> (&[u8], &[u8], &[u32]) {
     (
         bytemuck::cast_slice(bvh.nodes()),
         bytemuck::cast_slice(bvh.leaves()),
@@ -561,6 +563,20 @@ fn trees_of_any_shape_fit_the_stack() {
 }
 
 #[cfg(feature = "rayon")]
+fn check_threads<N: WideNode>(mesh: &TriangleMesh, preset: Preset) {
+    let build = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let builder = Builder::new().preset(preset);
+        pool.unwrap()
+            .install(|| builder.build_as::<N>(mesh).unwrap())
+    };
+    let one = build(1);
+    for threads in [2, 7] {
+        assert_same(&one, &build(threads));
+    }
+}
+
+#[cfg(feature = "rayon")]
 #[test]
 fn the_same_on_any_number_of_threads() {
     let mut positions = dust(150_000, 29);
@@ -568,17 +584,14 @@ fn the_same_on_any_number_of_threads() {
     let indices = soup(&positions);
     let mesh = TriangleMesh::new(&positions, &indices).unwrap();
     for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
-        let build = |threads: usize| {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap()
-                .install(|| Builder::new().preset(preset).build(&mesh).unwrap())
-        };
-        let one = build(1);
-        for threads in [2, 7] {
-            assert_same(&one, &build(threads));
-        }
+        check_threads::<Node8>(&mesh, preset);
+    }
+    check_threads::<Node4>(&mesh, Preset::Fast);
+    check_threads::<CompactNode8>(&mesh, Preset::Fast);
+    check_threads::<CompactNode4>(&mesh, Preset::Fast);
+    for count in [0, 1, 2, 4096, 4097] {
+        let mesh = TriangleMesh::new(&positions, &indices[..count]).unwrap();
+        check_threads::<Node8>(&mesh, Preset::Fast);
     }
 }
 

@@ -97,6 +97,18 @@ impl Link {
         Self(place | Child::LEAF)
     }
 
+    /// The link to the same after so many other nodes and leaves.
+    #[inline(always)]
+    pub(crate) const fn after<N>(self, nodes: u32, leaves: u32) -> Self {
+        if self.0 == Child::EMPTY.0 {
+            self
+        } else if self.is_leaf() {
+            Self::leaf_at(self.0.wrapping_add(leaves))
+        } else {
+            Self(self.0.wrapping_add(Self::node::<N>(nodes).0) & !Child::LEAF)
+        }
+    }
+
     /// What it leads to.
     #[inline]
     pub const fn child<N>(self) -> Child {

@@ -120,6 +120,9 @@ pub trait Head: Pod + Debug {
     /// `units`. `counts` are the primitives of each child, none of a node.
     #[doc(hidden)]
     fn new(nodes: u32, units: u32, counts: &[u8]) -> (Self, u8);
+    /// The same after so many other nodes and primitives.
+    #[doc(hidden)]
+    fn after(&self, nodes: u32, units: u32) -> Self;
     /// How many children there are; of a node that is none, less than 16.
     #[doc(hidden)]
     fn children(&self, more: u8) -> usize;
@@ -161,6 +164,14 @@ impl Head for Head8 {
         }
         let head = Self { nodes, units, ends };
         (head, counts.len() as u8)
+    }
+
+    fn after(&self, nodes: u32, units: u32) -> Self {
+        Self {
+            nodes: self.nodes.wrapping_add(nodes),
+            units: self.units.wrapping_add(units),
+            ends: self.ends,
+        }
     }
 
     #[inline(always)]
@@ -219,6 +230,15 @@ impl Head for Head4 {
             units: units & Self::PLACE | b << 28,
         };
         (head, (c | d << 4) as u8)
+    }
+
+    fn after(&self, nodes: u32, units: u32) -> Self {
+        let after =
+            |place: u32, more| place & !Self::PLACE | place.wrapping_add(more) & Self::PLACE;
+        Self {
+            nodes: after(self.nodes, nodes),
+            units: after(self.units, units),
+        }
     }
 
     #[inline(always)]
@@ -294,6 +314,16 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
             head,
             planes,
         }
+    }
+
+    /// The places of nodes and of leaves that there are not stay what they are.
+    fn after(&self, nodes: u32, leaves: u32) -> Self {
+        let is_leaf = |lane| self.head.link::<Self>(self.frame.more, lane).is_leaf();
+        let (first, last) = (is_leaf(0), is_leaf(self.lanes().saturating_sub(1)));
+        let head = self
+            .head
+            .after(if first { 0 } else { nodes }, if last { leaves } else { 0 });
+        Self { head, ..*self }
     }
 
     /// How many lanes have a child.

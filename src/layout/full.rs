@@ -61,6 +61,15 @@ impl<const W: usize, A> Node<W, A> {
         node
     }
 
+    #[inline(always)]
+    fn after(&self, nodes: u32, leaves: u32) -> Self {
+        Self {
+            align: [],
+            planes: self.planes,
+            links: self.links.map(|link| link.after::<Self>(nodes, leaves)),
+        }
+    }
+
     #[inline]
     fn aabb(&self, lane: usize) -> Aabb {
         if lane >= W {

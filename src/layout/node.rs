@@ -10,7 +10,7 @@ use bytemuck::Pod;
 use glam::Vec3;
 
 /// A node of some width and precision: what the one traversal needs of it.
-pub trait WideNode: Pod + sealed::Sealed {
+pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
     /// How many children it has at most.
     const WIDTH: usize;
     /// In the header of [bytes](super::bytes).
@@ -45,6 +45,10 @@ pub trait WideNode: Pod + sealed::Sealed {
     /// A node of up to [`WIDTH`](Self::WIDTH) children with their bounds, in the lanes' order; more are
     /// left out.
     fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self;
+
+    /// The same after so many other nodes and leaves.
+    #[doc(hidden)]
+    fn after(&self, nodes: u32, leaves: u32) -> Self;
 
     /// How many lanes may have a child.
     #[doc(hidden)]
@@ -131,7 +135,8 @@ pub(super) mod sealed {
 }
 
 /// The one implementation of [`WideNode`], for nodes of `$width` children in `$bytes` bytes, `$kind` in headers, that can
-/// - be made of children, say whether only of ordered ones, and of how many in all: `new`, `ORDERED`, `PLACES`;
+/// - be made of children, say whether only of ordered ones, and of how many in all: `new`, `ORDERED`, `PLACES`; and be put after
+///   others: `after`;
 /// - say where its links begin: `LINKS`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
@@ -161,6 +166,11 @@ macro_rules! impl_wide_node {
 
             fn from_children(children: impl IntoIterator<Item = (Aabb, Child)>) -> Self {
                 Self::new(children)
+            }
+
+            #[inline(always)]
+            fn after(&self, nodes: u32, leaves: u32) -> Self {
+                self.after(nodes, leaves)
             }
 
             #[inline(always)]
