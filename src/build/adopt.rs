@@ -37,8 +37,7 @@ pub(super) fn adopt<I: Input>(
         return Ok(BinaryTree::default());
     }
 
-    let mut order = Vec::with_capacity(total);
-    let nodes = lay_out(total, 0, |mut index, below| {
+    Ok(lay_out(total, 0, |mut index| {
         while !tree.nodes()[index].is_leaf() {
             match below_inner(tree, &counts, index) {
                 ControlFlow::Continue(only) => index = only,
@@ -47,11 +46,8 @@ pub(super) fn adopt<I: Input>(
         }
         let leaf = listed(tree, &tree.nodes()[index]);
         let mut kept: Vec<_> = leaf.filter_map(|&id| places.of(&refs.refs, id)).collect();
-        let subtree = binned::subtree(input, &mut kept, order.len(), below, Leaves::SINGLE, watch);
-        order.extend(kept.iter().map(Ref::id));
-        Part::Tree(subtree)
-    });
-    Ok(BinaryTree::new_unchecked(nodes, order))
+        Part::Tree(binned::subtree(input, &mut kept, Leaves::SINGLE, watch).tree())
+    }))
 }
 
 /// The primitives of a leaf.

@@ -32,6 +32,17 @@ impl BinaryNode {
     pub(super) const fn children(&self) -> [usize; 2] {
         [self.first as usize, self.first as usize + 1]
     }
+
+    /// The same in another tree: what is below the root of its own goes to the first of these places, the primitives to
+    /// the second.
+    #[inline]
+    pub(super) fn below(&self, (nodes, places): (u32, u32)) -> Self {
+        let first = match self.is_leaf() {
+            true => self.first + places,
+            false => (self.first + nodes).wrapping_sub(1),
+        };
+        Self { first, ..*self }
+    }
 }
 
 /// A binary tree over primitives, of any shape and depth, which is known to be a tree.

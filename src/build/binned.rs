@@ -1,16 +1,15 @@
 //! The binary tree, from the top down to single primitives.
 //!
-//! A subtree of n primitives has 2n - 1 nodes, so each has its own range of nodes before it is built: subtrees
-//! are built at once, and the tree is the same however many cores there are.
+//! Parts of the tree are built at once; it is the same however many cores there are.
 
 use super::{
     BuildError,
+    assembly::Assembly,
     binary::{BinaryNode, BinaryTree},
     input::Input,
-    lay_out::prune,
     monitor::{STRIDE, Watch},
     pages,
-    parallel::{TASK, join},
+    parallel::{self, TASK, join},
     refs::{Bounds, Ref, Refs},
     split::Cut,
     sweep::{self, Leaves},
@@ -22,6 +21,9 @@ use std::vec::Vec;
 /// Below this the heuristic is given up for halves: so a cut that takes off little each time costs neither the
 /// square of the time nor the stack, on which there are 64 levels, another 24 of halves and 63 of sweeps at most.
 const MAX_DEPTH: u32 = 64;
+
+/// With threads, so many references are one part.
+const PART: usize = 2 * TASK;
 
 /// The tree over all of `refs`.
 ///
@@ -37,121 +39,97 @@ pub(super) fn build<I: Input>(
     if refs.is_empty() {
         return Ok(BinaryTree::default());
     }
-    let nodes = subtree(input, &mut refs, 0, 1, leaves, watch);
+    let tree = subtree(input, &mut refs, leaves, watch);
+    let tree = tree.tree();
     watch.check()?;
-    let nodes = prune(nodes, leaves, watch);
-    let order = refs.iter().map(Ref::id).collect();
-    Ok(BinaryTree::new_unchecked(nodes, order))
+    Ok(tree)
 }
 
-/// The nodes of the tree over `refs`, of which there are some, and which are left in its order. Their places in the
-/// order begin at `first`, those of the nodes but the root at `below`.
+/// The tree over `refs`, of which there are some.
 pub(super) fn subtree<I: Input>(
     input: &I,
     refs: &mut [Ref],
-    first: usize,
-    below: usize,
     leaves: Leaves,
     watch: &Watch,
-) -> Vec<BinaryNode> {
+) -> Assembly {
     let centers = bounds_of_centers(refs);
-    let mut nodes = pages::filled(BinaryNode::zeroed(), 2 * refs.len() - 1);
-    if let [root, nodes @ ..] = &mut nodes[..] {
-        Task {
-            input,
-            refs,
-            centers,
-            depth: 0,
-            root,
-            nodes,
-            first: first as u32,
-            below: below as u32,
-            leaves,
-            watch,
-        }
-        .build();
-    }
-    nodes
+    let builder = Binned {
+        input,
+        leaves,
+        whole: match parallel::is_alone() {
+            true => usize::MAX,
+            false => PART,
+        },
+        watch,
+    };
+    builder.grow(refs, &centers, 0)
 }
 
-/// A subtree that is to be built.
-struct Task<'a, I> {
+/// What all of it needs.
+struct Binned<'a, I> {
     input: &'a I,
-    refs: &'a mut [Ref],
-    /// The bounds of twice the references' centers.
-    centers: Bounds,
-    depth: u32,
-    root: &'a mut BinaryNode,
-    /// All nodes but the root.
-    nodes: &'a mut [BinaryNode],
-    /// The place of `refs[0]` in the tree's order.
-    first: u32,
-    /// The place of `nodes[0]` in the tree.
-    below: u32,
     leaves: Leaves,
+    /// Up to so many references are one part.
+    whole: usize,
     watch: &'a Watch<'a>,
 }
 
-impl<I: Input> Task<'_, I> {
-    fn build(self) {
-        let Self {
-            input,
-            refs,
-            centers,
-            depth,
-            root,
-            nodes,
-            first,
-            below,
-            leaves,
-            watch,
-        } = self;
+impl<I: Input> Binned<'_, I> {
+    /// The tree over `refs`; `centers` are the bounds of twice their centers.
+    fn grow(&self, refs: &mut [Ref], centers: &Bounds, depth: u32) -> Assembly {
+        if refs.len() <= self.whole || !self.watch.advance(0) {
+            // Most leaves have two primitives at least. What is not used is not touched.
+            let mut nodes = pages::with_capacity(refs.len());
+            nodes.push(BinaryNode::zeroed());
+            self.build(refs, centers, depth, 0, &mut nodes, 0);
+            let order = refs.iter().map(Ref::id).collect();
+            return Assembly::Whole(BinaryTree::new_unchecked(nodes, order));
+        }
+        let (mid, left_centers, right_centers) = split(refs, centers, depth);
+        let (left, right) = refs.split_at_mut(mid);
+        let (left, right) = join(
+            left.len().min(right.len()) > TASK,
+            || self.grow(left, &left_centers, depth + 1),
+            || self.grow(right, &right_centers, depth + 1),
+        );
+        Assembly::two(left, right)
+    }
+
+    /// The same in one: the root to a place of `nodes`, those below it to their end. `first` is the place of `refs` in the order.
+    fn build(
+        &self,
+        refs: &mut [Ref],
+        centers: &Bounds,
+        depth: u32,
+        first: usize,
+        nodes: &mut Vec<BinaryNode>,
+        root: usize,
+    ) {
         if refs.len() <= sweep::MAX {
-            if watch.advance(refs.len()) {
-                sweep::build(input, refs, first, root, nodes, below, leaves);
+            if self.watch.advance(refs.len()) {
+                sweep::build(self.input, refs, first, self.leaves, nodes, root);
             }
             return;
         }
-        if refs.len() > STRIDE && !watch.advance(0) {
+        if refs.len() > STRIDE && !self.watch.advance(0) {
             return;
         }
-        let (mid, left_centers, right_centers) = split(refs, &centers, depth);
-        let (left_refs, right_refs) = refs.split_at_mut(mid);
-        let worth_it = left_refs.len().min(right_refs.len()) > TASK;
-        let [left_root, right_root, nodes @ ..] = nodes else {
-            return;
-        };
-        let (left_nodes, right_nodes) = nodes.split_at_mut(2 * mid - 2);
-        let below_left = below + 2;
-        let below_right = below_left + left_nodes.len() as u32;
-        let left = Task {
-            input,
-            refs: left_refs,
-            centers: left_centers,
-            depth: depth + 1,
-            root: &mut *left_root,
-            nodes: left_nodes,
-            first,
-            below: below_left,
-            leaves,
-            watch,
-        };
-        let right = Task {
-            input,
-            refs: right_refs,
-            centers: right_centers,
-            depth: depth + 1,
-            root: &mut *right_root,
-            nodes: right_nodes,
-            first: first + mid as u32,
-            below: below_right,
-            leaves,
-            watch,
-        };
-        join(worth_it, || left.build(), || right.build());
-        *root = BinaryNode {
-            aabb: left_root.aabb.join(right_root.aabb),
-            first: below,
+        let (mid, left_centers, right_centers) = split(refs, centers, depth);
+        let (left, right) = refs.split_at_mut(mid);
+        let below = nodes.len();
+        nodes.extend([BinaryNode::zeroed(); 2]);
+        self.build(left, &left_centers, depth + 1, first, nodes, below);
+        self.build(
+            right,
+            &right_centers,
+            depth + 1,
+            first + mid,
+            nodes,
+            below + 1,
+        );
+        nodes[root] = BinaryNode {
+            aabb: nodes[below].aabb.join(nodes[below + 1].aabb),
+            first: below as u32,
             count: 0,
         };
     }

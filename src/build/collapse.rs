@@ -24,6 +24,8 @@ use crate::{
 use core::ops::Range;
 use std::{vec, vec::Vec};
 
+/// Primitives are fetched so many before they may be read, and where they are as many before that.
+const AHEAD: usize = 24;
 /// Subtrees of up to so many nodes are one task.
 const TASK_NODES: usize = 1 << 14;
 
@@ -116,6 +118,14 @@ impl<const W: usize> Shape<W> for Collapse<'_, W> {
     fn cuts(&self, node: usize) -> Cuts {
         self.entries[node].cuts
     }
+
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, token: S, node: usize) {
+        for child in self.below(node) {
+            token.prefetch_line((&raw const self.nodes[child]).cast());
+            token.prefetch_line((&raw const self.entries[child].cuts).cast());
+        }
+    }
 }
 
 struct Solver<'a, const W: usize, I> {
@@ -194,6 +204,16 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         let BinaryNode { aabb, first, count } = self.nodes[node];
         let area = self.measure.half_area(&aabb);
         if self.nodes[node].is_leaf() {
+            // Those of leaves to come, in case they are to be one.
+            for place in first..first + count {
+                let order = self.order;
+                if let Some(&id) = order.get((place as usize).wrapping_sub(2 * AHEAD)) {
+                    self.input.fetch_place(token, id);
+                }
+                if let Some(&id) = order.get((place as usize).wrapping_sub(AHEAD)) {
+                    self.input.fetch(token, self.input.place(id));
+                }
+            }
             return Entry {
                 forest: [area * I::leaf_cost(count as usize); MAX_WIDTH],
                 cuts: Cuts::NONE,

@@ -5,19 +5,26 @@ use super::{
     binary::BinaryTree,
     collapse::Collapse,
     cuts::Cuts,
-    input::{Input, leaf_of},
+    input::{Input, LeafOf},
     monitor::Watch,
-    pages,
+    pages::{self, Slots},
     walk::{Walked, walk},
 };
 use crate::{
     geometry::Aabb,
     layout::{LayoutError, WideNode},
-    simd::{Backend, Simd},
+    simd::{Backend, Operation, Simd},
 };
-use bytemuck::Zeroable;
-use core::ops::Range;
+use core::{
+    ops::Range,
+    sync::atomic::{AtomicUsize, Ordering::Relaxed},
+};
 use std::vec::Vec;
+
+/// So many leaves are filled in one go.
+const CHUNK: usize = 1 << 10;
+/// Primitives are fetched so many before they are read, and where they are as many before that.
+const AHEAD: usize = 32;
 
 /// The parts that [`Bvh::from_parts`](crate::layout::Bvh::from_parts) takes.
 pub(super) struct Parts<N, L> {
@@ -110,44 +117,113 @@ fn fill<I: Input>(
     ranges: &[Range<usize>],
     watch: &Watch,
 ) -> Result<(Vec<I::Leaf>, Vec<u32>), LayoutError> {
+    let list = |ranges: &[Range<usize>]| List::new(input, order, ranges);
+    #[cfg(feature = "rayon")]
+    let mut lists: Vec<_> = {
+        use rayon::prelude::*;
+        ranges.par_chunks(CHUNK).map(list).collect()
+    };
+    #[cfg(not(feature = "rayon"))]
+    let mut lists: Vec<_> = ranges.chunks(CHUNK).map(list).collect();
     let mut primitives = pages::with_capacity(order.len());
-    let mut ends = Vec::with_capacity(ranges.len() + 1);
-    ends.push(0);
-    for range in ranges {
-        let first = primitives.len();
-        let numbers = order[range.clone()].iter();
-        primitives.extend(numbers.map(|&number| input.primitive(number)));
-        primitives[first..].sort_unstable();
-        // Pieces of a triangle may have met again.
-        let mut end = first;
-        for place in first..primitives.len() {
-            if place == first || primitives[place] != primitives[place - 1] {
-                primitives[end] = primitives[place];
-                end += 1;
-            }
-        }
-        primitives.truncate(end);
-        ends.push(primitives.len());
+    for list in &mut lists {
+        list.first = primitives.len() as u32;
+        primitives.extend_from_slice(&list.primitives);
     }
     let backend = Backend::detect();
-    let mut leaves = pages::filled(I::Leaf::zeroed(), ranges.len());
-    let fill = |(index, (leaf, ends)): (usize, (&mut I::Leaf, &[usize]))| {
-        watch.advance(1);
-        let ids = &primitives[ends[0]..ends[1]];
-        let filled = leaf_of(backend, input, ids, ends[0] as u32);
-        *leaf = filled.ok_or(LayoutError::Leaf(index))?;
+    // The first that is none.
+    let wrong = AtomicUsize::new(usize::MAX);
+    let leaves = pages::made(ranges.len(), CHUNK, |first, leaves| {
+        watch.advance(leaves.left());
+        let list = &lists[first / CHUNK];
+        let filled = backend.run(Fill {
+            input,
+            list,
+            leaves,
+        });
+        if let Err(place) = filled {
+            wrong.fetch_min(first + place, Relaxed);
+        }
+    });
+    match wrong.into_inner() {
+        usize::MAX => Ok((leaves, primitives)),
+        leaf => Err(LayoutError::Leaf(leaf)),
+    }
+}
+
+/// What is in [`CHUNK`] leaves.
+struct List {
+    primitives: Vec<u32>,
+    /// Where each leaf ends.
+    ends: Vec<usize>,
+    /// The place of the first in the list of all.
+    first: u32,
+}
+
+impl List {
+    fn new<I: Input>(input: &I, order: &[u32], ranges: &[Range<usize>]) -> Self {
+        let mut primitives = Vec::with_capacity(4 * ranges.len());
+        let mut ends = Vec::with_capacity(ranges.len());
+        for range in ranges {
+            let first = primitives.len();
+            let numbers = order[range.clone()].iter();
+            primitives.extend(numbers.map(|&number| input.primitive(number)));
+            primitives[first..].sort_unstable();
+            // Pieces of a triangle may have met again.
+            let mut end = first;
+            for place in first..primitives.len() {
+                if place == first || primitives[place] != primitives[place - 1] {
+                    primitives[end] = primitives[place];
+                    end += 1;
+                }
+            }
+            primitives.truncate(end);
+            ends.push(end);
+        }
+        Self {
+            primitives,
+            ends,
+            first: 0,
+        }
+    }
+}
+
+struct Fill<'a, 's, I: Input> {
+    input: &'a I,
+    list: &'a List,
+    leaves: &'a mut Slots<'s, I::Leaf>,
+}
+
+impl<I: Input> Operation for Fill<'_, '_, I> {
+    /// What is no leaf, if anything.
+    type Output = Result<(), usize>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) -> Self::Output {
+        let Self {
+            input,
+            list,
+            leaves,
+        } = self;
+        let primitives = &list.primitives[..];
+        let mut start = 0;
+        for (leaf, &end) in list.ends.iter().enumerate() {
+            for place in start..end {
+                if let Some(&id) = primitives.get(place + 2 * AHEAD) {
+                    input.fetch_place(token, id);
+                }
+                if let Some(&id) = primitives.get(place + AHEAD) {
+                    input.fetch(token, input.place(id));
+                }
+            }
+            let filled = LeafOf {
+                input,
+                ids: &primitives[start..end],
+                first: list.first + start as u32,
+            };
+            leaves.push(filled.run(token).ok_or(leaf)?);
+            start = end;
+        }
         Ok(())
-    };
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        let with_ends = leaves.par_iter_mut().zip(ends.par_windows(2));
-        with_ends.enumerate().try_for_each(fill)?;
     }
-    #[cfg(not(feature = "rayon"))]
-    {
-        let with_ends = leaves.iter_mut().zip(ends.windows(2));
-        with_ends.enumerate().try_for_each(fill)?;
-    }
-    Ok((leaves, primitives))
 }

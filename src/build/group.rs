@@ -5,7 +5,7 @@
 
 use super::{
     BuildError,
-    binary::{BinaryNode, BinaryTree},
+    binary::BinaryTree,
     collapse::Collapse,
     cost::Measure,
     cuts::MAX_WIDTH,
@@ -110,25 +110,17 @@ pub(super) fn group<I: Input, const W: usize>(
         }
     }
 
-    let mut order = pages::with_capacity(tree.order().len());
-    let nodes = lay_out(groups.len(), 0, |mut index: usize, _| {
+    Ok(lay_out(groups.len(), 0, |mut index: usize| {
         loop {
             if let Some(group) = groups.get(group_at[index] as usize) {
-                let first = order.len() as u32;
-                order.extend_from_slice(group.ids());
-                return Part::Leaf(BinaryNode {
-                    aabb: group.aabb,
-                    first,
-                    count: group.len as u32,
-                });
+                return Part::Leaf(group.aabb, group.ids());
             }
             match below_inner(tree, &counts, index) {
                 ControlFlow::Continue(only) => index = only,
                 ControlFlow::Break(both) => return both,
             }
         }
-    });
-    Ok(BinaryTree::new_unchecked(nodes, order))
+    }))
 }
 
 /// The leaves of every wide node, joined.

@@ -93,10 +93,11 @@ pub(super) fn leaf_of<I: Input>(
     backend.run(LeafOf { input, ids, first })
 }
 
-struct LeafOf<'a, I> {
-    input: &'a I,
-    ids: &'a [u32],
-    first: u32,
+/// What [`leaf_of`] does.
+pub(super) struct LeafOf<'a, I> {
+    pub input: &'a I,
+    pub ids: &'a [u32],
+    pub first: u32,
 }
 
 impl<I: Input> Operation for LeafOf<'_, I> {

@@ -4,109 +4,72 @@
 //! node comes before those below it; what is below it is one range; and the leaves, from left to right, have
 //! the tree's order of primitives from its beginning to its end.
 
-use super::{
-    binary::{BinaryNode, BinaryTree},
-    monitor::Watch,
-    pages,
-    sweep::Leaves,
-};
+use super::binary::{BinaryNode, BinaryTree};
+use super::pages;
 use crate::geometry::Aabb;
 use bytemuck::Zeroable;
 use core::ops::ControlFlow;
-use std::{vec, vec::Vec};
+use std::vec;
 
-/// The nodes that the root leads to, if there may be others.
-pub(super) fn prune(nodes: Vec<BinaryNode>, leaves: Leaves, watch: &Watch) -> Vec<BinaryNode> {
-    if leaves.below == 0.0 {
-        return nodes;
-    }
-    let mut counts = pages::filled(1u32, nodes.len());
-    for (index, node) in nodes.iter().enumerate().rev() {
-        if !node.is_leaf() {
-            let [left, right] = node.children();
-            counts[index] = counts[left] + counts[right];
-        }
-    }
-    lay_out(counts[0] as usize, 0, |index: usize, _| {
-        watch.advance(1);
-        let node = nodes[index];
-        if node.is_leaf() {
-            return Part::Leaf(node);
-        }
-        let [left, right] = node.children();
-        Part::Inner {
-            left,
-            right,
-            left_leaves: counts[left] as usize,
-        }
-    })
-}
-
-/// What goes into a place of a new tree. `T` is whatever tells the parts of the old one apart.
-pub(super) enum Part<T> {
-    /// A leaf, with its box.
-    Leaf(BinaryNode),
+/// What is next in a new tree. `T` is whatever tells the parts of the old one apart.
+pub(super) enum Part<'a, T> {
+    /// A leaf: its box and its primitives.
+    Leaf(Aabb, &'a [u32]),
     /// A node over two parts.
-    Inner {
-        left: T,
-        right: T,
-        /// How many leaves are in the left part.
-        left_leaves: usize,
-    },
-    /// A node and all below it, in order; the place of the second is the one that was given.
-    Tree(Vec<BinaryNode>),
+    Inner([T; 2]),
+    /// A node and all below it.
+    Tree(BinaryTree),
 }
 
 /// What an inner node of `tree` is over in a new tree, `counts` being the new leaves below each node: both its
 /// sides, or the only one that has any, which takes its place.
-pub(super) fn below_inner(
+pub(super) fn below_inner<'a>(
     tree: &BinaryTree,
     counts: &[usize],
     index: usize,
-) -> ControlFlow<Part<usize>, usize> {
+) -> ControlFlow<Part<'a, usize>, usize> {
     let [left, right] = tree.nodes()[index].children();
     match (counts[left], counts[right]) {
         (0, _) => ControlFlow::Continue(right),
         (_, 0) => ControlFlow::Continue(left),
-        (left_leaves, _) => ControlFlow::Break(Part::Inner {
-            left,
-            right,
-            left_leaves,
-        }),
+        _ => ControlFlow::Break(Part::Inner([left, right])),
     }
 }
 
-/// The nodes of a tree of so many leaves, more than none. `part` is asked for every part from left to right, and
-/// told where the nodes below it go.
-pub(super) fn lay_out<T>(
+/// The tree of `root`. `part` is asked for every part from left to right. There is room for so many leaves at once.
+pub(super) fn lay_out<'a, T>(
     leaves: usize,
     root: T,
-    mut part: impl FnMut(T, usize) -> Part<T>,
-) -> Vec<BinaryNode> {
-    let mut nodes = pages::filled(BinaryNode::zeroed(), 2 * leaves - 1);
-    // A part, its place, and that of the nodes below it.
-    let mut todo = vec![(root, 0, 1)];
-    while let Some((old, place, below)) = todo.pop() {
-        match part(old, below) {
-            Part::Leaf(leaf) => nodes[place] = leaf,
-            Part::Inner {
-                left,
-                right,
-                left_leaves,
-            } => {
+    mut part: impl FnMut(T) -> Part<'a, T>,
+) -> BinaryTree {
+    let mut nodes = pages::with_capacity(2 * leaves);
+    let mut order = pages::with_capacity(leaves);
+    nodes.push(BinaryNode::zeroed());
+    // A part and its place.
+    let mut todo = vec![(root, 0)];
+    while let Some((next, place)) = todo.pop() {
+        match part(next) {
+            Part::Leaf(aabb, primitives) => {
                 nodes[place] = BinaryNode {
-                    aabb: Aabb::EMPTY,
-                    first: below as u32,
-                    count: 0,
+                    aabb,
+                    first: order.len() as u32,
+                    count: primitives.len() as u32,
                 };
-                let below_left = below + 2;
-                let below_right = below_left + 2 * left_leaves - 2;
-                todo.push((right, below + 1, below_right));
-                todo.push((left, below, below_left));
+                order.extend_from_slice(primitives);
+            }
+            Part::Inner([left, right]) => {
+                let below = nodes.len();
+                nodes[place].first = below as u32;
+                nodes.extend([BinaryNode::zeroed(); 2]);
+                todo.push((right, below + 1));
+                todo.push((left, below));
             }
             Part::Tree(tree) => {
-                nodes[place] = tree[0];
-                nodes[below..][..tree.len() - 1].copy_from_slice(&tree[1..]);
+                let before = (nodes.len() as u32, order.len() as u32);
+                let mut below = tree.nodes().iter().map(|node| node.below(before));
+                nodes[place] = below.next().unwrap_or(BinaryNode::zeroed());
+                nodes.extend(below);
+                order.extend_from_slice(tree.order());
             }
         }
     }
@@ -117,5 +80,5 @@ pub(super) fn lay_out<T>(
             nodes[index].aabb = nodes[left].aabb.join(nodes[right].aabb);
         }
     }
-    nodes
+    BinaryTree::new_unchecked(nodes, order)
 }

@@ -16,7 +16,7 @@
 //
 // 1. `refs`: every primitive of the `input` is looked at; its box and its number.
 // 2. `spatial`, for large triangles, some of which become `pieces`, by `clip`; then `binned`, by `split` and
-//    `sweep`: the binary tree, from the top down. Or `adopt`: a caller's.
+//    `sweep`: the binary tree, from the top down, in parts, of which `assembly` makes one. Or `adopt`: a caller's.
 // 3. `reinsertion`: subtrees are moved to where they cost least.
 // 4. `collapse`: which subtrees are leaves and which nodes become one wide one, at the least `cost`; `cuts`, how.
 // 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
@@ -35,6 +35,7 @@
 // deeper than a bound, whatever the tree. `monitor` is told of all that takes long.
 
 mod adopt;
+mod assembly;
 mod binary;
 mod binned;
 mod builder;

@@ -22,3 +22,11 @@ pub(super) fn join<A: Send, B: Send>(
 pub(super) fn join<A, B>(_worth_it: bool, a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
     (a(), b())
 }
+
+/// Whether there are no other threads.
+pub(super) fn is_alone() -> bool {
+    #[cfg(feature = "rayon")]
+    return rayon::current_num_threads() == 1;
+    #[cfg(not(feature = "rayon"))]
+    true
+}

@@ -28,8 +28,12 @@ pub(super) fn rebalance(tree: &BinaryTree, levels: u32) -> BinaryTree {
     // How many leaves come before a node's; told apart by the first of them.
     let rank = |first: u32| leaves.partition_point(|leaf| leaf.first < first);
     let root = Task::Keep { node: 0, levels };
-    let balanced = lay_out(leaves.len(), root, |task, _| match task {
-        Task::Keep { node, .. } if nodes[node].is_leaf() => Part::Leaf(nodes[node]),
+    let leaf = |leaf: &BinaryNode| {
+        let primitives = &tree.order()[leaf.first as usize..][..leaf.count as usize];
+        Part::Leaf(leaf.aabb, primitives)
+    };
+    lay_out(leaves.len(), root, |task| match task {
+        Task::Keep { node, .. } if nodes[node].is_leaf() => leaf(&nodes[node]),
         Task::Keep { node, levels } => {
             let [left, right] = nodes[node].children();
             let Run {
@@ -40,33 +44,20 @@ pub(super) fn rebalance(tree: &BinaryTree, levels: u32) -> BinaryTree {
             let fits = |child: usize| halvings(runs[child].count) < levels;
             if depth <= levels || (fits(left) && fits(right)) {
                 let levels = levels - 1;
-                Part::Inner {
-                    left: Task::Keep { node: left, levels },
-                    right: Task::Keep {
-                        node: right,
-                        levels,
-                    },
-                    left_leaves: runs[left].count,
-                }
+                Part::Inner([left, right].map(|node| Task::Keep { node, levels }))
             } else {
                 let first = rank(first);
                 halve(first..first + count)
             }
         }
-        Task::Halve(run) if run.len() == 1 => Part::Leaf(leaves[run.start]),
+        Task::Halve(run) if run.len() == 1 => leaf(&leaves[run.start]),
         Task::Halve(run) => halve(run),
-    });
-    BinaryTree::new_unchecked(balanced, tree.order().to_vec())
+    })
 }
 
-fn halve(run: Range<usize>) -> Part<Task> {
-    let left_leaves = run.len() / 2;
-    let middle = run.start + left_leaves;
-    Part::Inner {
-        left: Task::Halve(run.start..middle),
-        right: Task::Halve(middle..run.end),
-        left_leaves,
-    }
+fn halve<'a>(run: Range<usize>) -> Part<'a, Task> {
+    let middle = run.start + run.len() / 2;
+    Part::Inner([run.start..middle, middle..run.end].map(Task::Halve))
 }
 
 /// How many levels of nodes halving `count` leaves down to single ones takes.

@@ -7,11 +7,13 @@
 
 use super::{
     BuildError,
+    assembly::Assembly,
     binary::{BinaryNode, BinaryTree},
     cost::Measure,
     lay_out::{Part, lay_out},
     monitor::Watch,
     pages,
+    parallel::{self, join},
     refs::Bounds,
 };
 use glam::Vec3;
@@ -35,6 +37,9 @@ const LOOKS_PER_NODE: usize = 100;
 /// How many nodes a subtree may look below. In six scenes it is 20 on average and never more than 64.
 const MOST_LOOKS: usize = 128;
 
+/// With threads, so many levels of the changed tree are above parts that are put in order at once.
+const LEVELS: u32 = 6;
+
 /// A node while the tree changes.
 #[derive(Clone, Copy)]
 struct Spot {
@@ -42,6 +47,7 @@ struct Spot {
     bounds: Bounds,
     area: f32,
     parent: u32,
+    /// The first child; what number a leaf had when it all began.
     first: u32,
     count: u32,
 }
@@ -126,7 +132,7 @@ pub(super) fn optimize(
 fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
     let vector = |v: Vec3| f32x4::new([v.x, v.y, v.z, 0.0]) * measure.scale();
     let mut spots = pages::with_capacity(nodes.len());
-    spots.extend(nodes.iter().map(|node| {
+    spots.extend(nodes.iter().zip(0..).map(|(node, index)| {
         let bounds = Bounds {
             min: vector(node.aabb.min),
             max: vector(node.aabb.max),
@@ -135,7 +141,10 @@ fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
             bounds,
             area: bounds.half_area(),
             parent: 0,
-            first: node.first,
+            first: match node.is_leaf() {
+                true => index,
+                false => node.first,
+            },
             count: node.count,
         }
     }));
@@ -327,52 +336,33 @@ fn refit_up(spots: &mut [Spot], mut index: u32) {
 
 /// The changed tree, in our order.
 fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
-    // How many leaves are below each node: by a walk from the root, back.
-    let mut counts = pages::filled(1u32, spots.len());
-    let mut walk = pages::with_capacity(spots.len());
-    walk.push(0);
-    let mut next = 0;
-    while let Some(&index) = walk.get(next) {
-        next += 1;
-        let spot = &spots[index as usize];
-        if spot.count == 0 {
-            walk.extend([spot.first, spot.first + 1]);
-        }
-    }
-    for &index in walk.iter().rev() {
-        let spot = &spots[index as usize];
-        if spot.count == 0 {
-            let first = spot.first as usize;
-            counts[index as usize] = counts[first] + counts[first + 1];
-        }
-    }
+    let levels = if parallel::is_alone() { 0 } else { LEVELS };
+    // As if all parts were as large.
+    let leaves = tree.nodes().len() >> (levels + 1);
+    below(tree, spots, 0, levels, leaves).tree()
+}
 
-    // Leaves are told by their places in the old order, which gives their exact boxes.
-    let mut leaf_at = pages::filled(0, tree.order().len());
-    for (node, index) in tree.nodes().iter().zip(0u32..) {
-        if node.is_leaf() {
-            leaf_at[node.first as usize] = index;
-        }
+/// What is below a node, so many levels of it in parts, of about so many leaves.
+fn below(tree: &BinaryTree, spots: &[Spot], index: u32, levels: u32, leaves: usize) -> Assembly {
+    let spot = &spots[index as usize];
+    if levels > 0 && spot.count == 0 {
+        let (left, right) = join(
+            true,
+            || below(tree, spots, spot.first, levels - 1, leaves),
+            || below(tree, spots, spot.first + 1, levels - 1, leaves),
+        );
+        return Assembly::two(left, right);
     }
-    let mut order = pages::with_capacity(tree.order().len());
-    let nodes = lay_out(counts[0] as usize, 0, |index: usize, _| {
-        let first = spots[index].first as usize;
-        if spots[index].count == 0 {
-            return Part::Inner {
-                left: first,
-                right: first + 1,
-                left_leaves: counts[first] as usize,
-            };
+    Assembly::Whole(lay_out(leaves, index, |index| {
+        let spot = &spots[index as usize];
+        if spot.count == 0 {
+            return Part::Inner([spot.first, spot.first + 1]);
         }
-        let leaf = tree.nodes()[leaf_at[first] as usize];
-        let place = order.len() as u32;
-        order.extend_from_slice(&tree.order()[first..first + leaf.count as usize]);
-        Part::Leaf(BinaryNode {
-            first: place,
-            ..leaf
-        })
-    });
-    BinaryTree::new_unchecked(nodes, order)
+        // The old one, which has the exact box.
+        let leaf = &tree.nodes()[spot.first as usize];
+        let places = leaf.first as usize..(leaf.first + leaf.count) as usize;
+        Part::Leaf(leaf.aabb, &tree.order()[places])
+    }))
 }
 
 #[cfg(test)]

@@ -11,12 +11,12 @@
 
 use super::{
     BuildError,
-    binary::{BinaryNode, BinaryTree},
+    assembly::Assembly,
+    binary::BinaryTree,
     binned::{self, bounds_of_centers},
     clip::clip,
     input::Input,
-    lay_out::{self, lay_out, prune},
-    monitor::{STRIDE, Watch},
+    monitor::Watch,
     parallel::{TASK, join},
     pieces::{Known, Piece, Pieces},
     planes::{self, Plane, meet},
@@ -330,13 +330,6 @@ fn bounds_of(refs: &[Ref]) -> Bounds {
         .fold(Bounds::EMPTY, |bounds, r| bounds.join(r.bounds()))
 }
 
-/// Where what the other builder builds goes.
-struct Job {
-    refs: Vec<Ref>,
-    first: usize,
-    below: usize,
-}
-
 /// Has what is left built, and puts all together.
 fn finish<I: Input>(
     pieces: &mut Pieces<I>,
@@ -344,28 +337,31 @@ fn finish<I: Input>(
     leaves: Leaves,
     watch: &Watch,
 ) -> Result<BinaryTree, BuildError> {
-    // In the order of `lay_out`.
-    let mut jobs = Vec::new();
+    number(pieces, &mut root);
+    let tree = built(pieces, root, leaves, watch).tree();
+    watch.check()?;
+    Ok(tree)
+}
+
+/// Takes pieces from where they were made, and gives them the numbers that they have from now on.
+fn number<I: Input>(pieces: &mut Pieces<I>, root: &mut Counted) {
     // Where pieces are now whose numbers begin at what is in their order.
     let mut moved: Vec<(u32, usize)> = Vec::new();
     let known = pieces.input.len();
-    let mut todo = vec![(&mut root, 0, 1)];
-    while let Some((part, first, below)) = todo.pop() {
+    let mut todo = vec![root];
+    while let Some(part) = todo.pop() {
         match &mut part.part {
             Grown::Inner {
                 pieces: here,
-                first: number,
+                first,
                 sides,
             } => {
                 if !here.is_empty() {
-                    moved.push((*number, known + pieces.pieces.len()));
+                    moved.push((*first, known + pieces.pieces.len()));
                     pieces.pieces.append(here);
                 }
                 let [left, right] = &mut **sides;
-                let left_count = left.count;
-                let below_right = below + 2 + 2 * left_count - 2;
-                todo.push((right, first + left_count, below_right));
-                todo.push((left, first, below + 2));
+                todo.extend([right, left]);
             }
             Grown::Rest(refs) => {
                 for r in refs.iter_mut().filter(|r| r.id() as usize >= known) {
@@ -374,41 +370,23 @@ fn finish<I: Input>(
                         *r = r.with_id((r.id() - first) + place as u32);
                     }
                 }
-                jobs.push(Job {
-                    refs: core::mem::take(refs),
-                    first,
-                    below,
-                });
             }
         }
     }
-    let pieces = &*pieces;
-    let build =
-        |job: &mut Job| binned::subtree(pieces, &mut job.refs, job.first, job.below, leaves, watch);
-    #[cfg(feature = "rayon")]
-    let built: Vec<Vec<BinaryNode>> = {
-        use rayon::prelude::*;
-        jobs.par_iter_mut().map(build).collect()
-    };
-    #[cfg(not(feature = "rayon"))]
-    let built: Vec<Vec<BinaryNode>> = jobs.iter_mut().map(build).collect();
+}
 
-    watch.check()?;
-    let order = jobs.iter().flat_map(|job| job.refs.iter().map(Ref::id));
-    let order = order.collect();
-    let mut built = built.into_iter();
-    let nodes = lay_out(root.count, &root, |part, _| match &part.part {
-        Grown::Inner { sides, .. } => lay_out::Part::Inner {
-            left: &sides[0],
-            right: &sides[1],
-            left_leaves: sides[0].count,
-        },
-        Grown::Rest(_) => {
-            watch.advance(STRIDE);
-            lay_out::Part::Tree(built.next().unwrap_or_default())
+/// A part with what is left built.
+fn built<I: Input>(pieces: &Pieces<I>, part: Counted, leaves: Leaves, watch: &Watch) -> Assembly {
+    match part.part {
+        Grown::Rest(mut refs) => binned::subtree(pieces, &mut refs, leaves, watch),
+        Grown::Inner { sides, .. } => {
+            let [left, right] = *sides;
+            let (left, right) = join(
+                left.count.min(right.count) > TASK,
+                || built(pieces, left, leaves, watch),
+                || built(pieces, right, leaves, watch),
+            );
+            Assembly::two(left, right)
         }
-    });
-    watch.advance(0);
-    let nodes = prune(nodes, leaves, watch);
-    Ok(BinaryTree::new_unchecked(nodes, order))
+    }
 }

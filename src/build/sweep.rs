@@ -7,7 +7,12 @@ use super::{
     input::{Input, leaf_of},
     refs::{Bounds, Ref, half_areas},
 };
-use crate::{geometry::Aabb, simd::Backend};
+use crate::{
+    geometry::Aabb,
+    simd::{Backend, Operation, Simd},
+};
+use bytemuck::Zeroable;
+use std::vec::Vec;
 use wide::f32x4;
 
 /// The most references that are swept. Above it bins are faster and lose next to nothing.
@@ -25,7 +30,6 @@ struct Sweep<'a, I> {
 }
 
 /// How far down a tree goes: to single primitives; or to leaves of as many as there is room for, if their box is small.
-/// Such a leaf saves nodes, in whose places there are leaves to which nothing leads.
 #[derive(Clone, Copy)]
 pub(super) struct Leaves {
     /// Half the area, scaled, below which a leaf is full.
@@ -50,41 +54,95 @@ impl Leaves {
     }
 }
 
-/// Builds the tree over `refs`, at most [`MAX`] of them, and leaves them in its order: `root`, and the
-/// nodes below it into `below`, whose own place is `at`.
+/// Builds the tree over `refs`, at most [`MAX`] of them, which are left in its order, where their first place is `first`. Its root
+/// goes to a place of `nodes`, those below it to their end.
 pub(super) fn build<I: Input>(
     input: &I,
     refs: &mut [Ref],
-    first: u32,
-    root: &mut BinaryNode,
-    below: &mut [BinaryNode],
-    at: u32,
+    first: usize,
     leaves: Leaves,
+    nodes: &mut Vec<BinaryNode>,
+    root: usize,
 ) {
-    let len = refs.len();
-    let mut sweep = Sweep {
+    let backend = Backend::detect();
+    backend.run(Build {
         input,
-        refs: [Ref::NONE; MAX],
-        orders: [[0; MAX]; 3],
+        refs,
         first,
         leaves,
-        backend: Backend::detect(),
-    };
-    sweep.refs[..len].copy_from_slice(refs);
-    let mut keys = [0; MAX];
-    for axis in 0..3 {
-        for (place, r) in refs.iter().enumerate() {
-            let center = r.center2().to_array()[axis];
-            keys[place] = (u64::from(sortable(center)) << 32) | place as u64;
+        backend,
+        nodes,
+        root,
+    });
+}
+
+struct Build<'a, I> {
+    input: &'a I,
+    refs: &'a mut [Ref],
+    first: usize,
+    leaves: Leaves,
+    backend: Backend,
+    nodes: &'a mut Vec<BinaryNode>,
+    root: usize,
+}
+
+impl<I: Input> Operation for Build<'_, I> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, token: S) {
+        let Self {
+            input,
+            refs,
+            first,
+            leaves,
+            backend,
+            nodes,
+            root,
+        } = self;
+        // Leaves are going to read what there is of primitives: it is fetched while they are sorted.
+        for r in &*refs {
+            input.fetch_place(token, r.id());
         }
-        keys[..len].sort_unstable();
-        for (order, key) in sweep.orders[axis].iter_mut().zip(&keys[..len]) {
-            *order = *key as u8;
+        let len = refs.len();
+        let mut sweep = Sweep {
+            input,
+            refs: [Ref::NONE; MAX],
+            orders: [[0; MAX]; 3],
+            first: first as u32,
+            leaves,
+            backend,
+        };
+        sweep.refs[..len].copy_from_slice(refs);
+        let mut keys = [0; MAX];
+        for axis in 0..3 {
+            for (place, r) in refs.iter().enumerate() {
+                let center = r.center2().to_array()[axis];
+                keys[place] = (u64::from(sortable(center)) << 32) | place as u64;
+            }
+            keys[..len].sort_unstable();
+            for (order, key) in sweep.orders[axis].iter_mut().zip(&keys[..len]) {
+                *order = *key as u8;
+            }
+            if axis == 1 {
+                for r in &*refs {
+                    input.fetch(token, input.place(r.id()));
+                }
+            }
         }
-    }
-    sweep.split(0, len, root, below, at);
-    for (r, &place) in refs.iter_mut().zip(&sweep.orders[0]) {
-        *r = sweep.refs[place as usize];
+        let below = nodes.len();
+        sweep.split_all(len, nodes, root);
+        for (r, &place) in refs.iter_mut().zip(&sweep.orders[0]) {
+            *r = sweep.refs[place as usize];
+        }
+        // Nodes after those below them.
+        for place in (below..nodes.len()).rev().chain([root]) {
+            let node = nodes[place];
+            if !node.is_leaf() {
+                let [left, right] = node.children();
+                nodes[place].aabb = nodes[left].aabb.join(nodes[right].aabb);
+            }
+        }
     }
 }
 
@@ -99,47 +157,47 @@ fn sortable(x: f32) -> u32 {
 }
 
 impl<I: Input> Sweep<'_, I> {
-    fn split(
-        &mut self,
-        start: usize,
-        end: usize,
-        root: &mut BinaryNode,
-        below: &mut [BinaryNode],
-        at: u32,
-    ) {
-        let fits = end - start <= I::MAX_LEAF && self.fits(start, end);
-        if fits || end - start == 1 {
-            *root = self.leaf(start, end);
-            // Nothing leads to the nodes that this saves, but they are looked at.
-            below.fill(self.leaf(start, start + 1));
-            return;
+    /// Splits the first so many. The boxes of nodes with children are left open.
+    #[inline(always)]
+    fn split_all(&mut self, len: usize, nodes: &mut Vec<BinaryNode>, root: usize) {
+        // Runs that are to be split, and the places of their nodes.
+        let mut todo = [(0, 0, 0); MAX];
+        todo[0] = (0, len, root);
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (start, end, place) = todo[count % MAX];
+            let fits = end - start <= I::MAX_LEAF && self.fits(start, end);
+            if fits || end - start == 1 {
+                nodes[place] = self.leaf(start, end);
+                continue;
+            }
+            // Of two there is one cut.
+            let mut mid = start + 1;
+            if end - start > 2 {
+                let axis;
+                (axis, mid) = self.cheapest(start, end);
+                self.partition(axis, start, mid, end);
+            }
+            let below = nodes.len();
+            nodes[place] = BinaryNode {
+                first: below as u32,
+                ..BinaryNode::zeroed()
+            };
+            nodes.extend([BinaryNode::zeroed(); 2]);
+            for run in [(mid, end, below + 1), (start, mid, below)] {
+                todo[count % MAX] = run;
+                count += 1;
+            }
         }
-        let [left, right, below @ ..] = below else {
-            return;
-        };
-        // Of two there is one cut.
-        let mut mid = start + 1;
-        if end - start > 2 {
-            let axis;
-            (axis, mid) = self.cheapest(start, end);
-            self.partition(axis, start, mid, end);
-        }
-        let (left_below, right_below) = below.split_at_mut(2 * (mid - start) - 2);
-        let left_at = at + 2;
-        let right_at = left_at + left_below.len() as u32;
-        self.split(start, mid, left, left_below, left_at);
-        self.split(mid, end, right, right_below, right_at);
-        *root = BinaryNode {
-            aabb: left.aabb.join(right.aabb),
-            first: at,
-            count: 0,
-        };
     }
 
+    #[inline(always)]
     fn id(&self, place: usize) -> u32 {
         self.refs[self.orders[0][place] as usize].id()
     }
 
+    #[inline(always)]
     fn leaf(&self, start: usize, end: usize) -> BinaryNode {
         let aabbs = (start..end).map(|place| self.input.aabb(self.id(place)));
         BinaryNode {
@@ -150,6 +208,7 @@ impl<I: Input> Sweep<'_, I> {
     }
 
     /// Whether these can be one leaf, and one that is small enough.
+    #[inline(always)]
     fn fits(&self, start: usize, end: usize) -> bool {
         let refs = self.orders[0][start..end].iter();
         let bounds = refs.fold(Bounds::EMPTY, |bounds, &place| {
@@ -166,7 +225,7 @@ impl<I: Input> Sweep<'_, I> {
     }
 
     /// The axis and the place of the cheapest cut; of equals the one nearest to halves.
-    #[inline]
+    #[inline(always)]
     fn cheapest(&self, start: usize, end: usize) -> (usize, usize) {
         let len = end - start;
         let [xs, ys, zs] = &self.orders;
@@ -213,6 +272,7 @@ impl<I: Input> Sweep<'_, I> {
     }
 
     /// Has the other axes' orders agree on what is left of `mid`.
+    #[inline(always)]
     fn partition(&mut self, axis: usize, start: usize, mid: usize, end: usize) {
         let mut is_left = [false; MAX];
         for &place in &self.orders[axis][start..mid] {
