@@ -255,7 +255,11 @@ fn find(spots: &[Spot], from: u32) -> Search {
                 sides.swap(0, 1);
             }
             // The better side first, to see early that others are worse.
-            todo.extend(sides.into_iter().filter(|side| side.0 > best.gain));
+            for side in sides {
+                if side.0 > best.gain {
+                    todo.push(side);
+                }
+            }
         }
         looks += 1;
         if pivot == 0 || looks > MOST_LOOKS {
