@@ -19,6 +19,8 @@ Usage: bake MESH OUT [OPTIONS]
                        in the file
       --reorder        compact with the mesh in the order in which rays read it, its vertices, too, and the numbers in
                        hits: large meshes are faster, see `Bvh::reorder`
+      --numbers FILE   with --reorder: writes the numbers that triangles had, then those that vertices had, for
+                       what else goes by them; 32 bits each, the lowest byte first
       --without-mesh   compact without the mesh: for who has that in memory already, see `Bvh::over`
   -h, --help           this text
 
@@ -42,6 +44,8 @@ pub struct Args {
     pub width: Width,
     /// Nodes and leaves.
     pub layout: Layout,
+    /// The file for the numbers that triangles and vertices had, if they get others.
+    pub numbers: Option<PathBuf>,
 }
 
 /// How many children a node has.
@@ -75,7 +79,7 @@ pub enum MeshInFile {
 
 /// Reads the program's own arguments.
 pub fn parse() -> Result<Request, lexopt::Error> {
-    let (mut mesh, mut out) = (None, None);
+    let (mut mesh, mut out, mut numbers) = (None, None, None);
     let (mut width, mut compact) = (Width::Eight, true);
     let (mut without_mesh, mut reorder) = (false, false);
     let mut parser = Parser::from_env();
@@ -89,6 +93,7 @@ pub fn parse() -> Result<Request, lexopt::Error> {
                 compact = parser.value()?.parse_with(is_compact)?;
             }
             Arg::Long("reorder") => reorder = true,
+            Arg::Long("numbers") => numbers = Some(file(parser.value()?)?),
             Arg::Long("without-mesh") => without_mesh = true,
             Arg::Value(path) if mesh.is_none() => mesh = Some(file(path)?),
             Arg::Value(path) if out.is_none() => out = Some(file(path)?),
@@ -109,11 +114,15 @@ pub fn parse() -> Result<Request, lexopt::Error> {
         (true, true, true) => return Err("--reorder, --without-mesh: which?".into()),
         (false, _, true) => return Err("--reorder: of the compact layout alone".into()),
     };
+    if numbers.is_some() && !reorder {
+        return Err("--numbers: without --reorder they stay what they are".into());
+    }
     Ok(Request::Bake(Args {
         mesh,
         out,
         width,
         layout,
+        numbers,
     }))
 }
 

@@ -12,6 +12,7 @@ use say::say;
 use std::{
     error::Error,
     fs,
+    path::Path,
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -52,8 +53,11 @@ fn bake(args: &Args) -> Result<(), Box<dyn Error>> {
     };
     spinner.finish_and_clear();
     let baked = baked.map_err(|error| format!("{}: {error}", args.mesh.display()))?;
-    fs::write(&args.out, &baked.bytes)
-        .map_err(|error| format!("{}: cannot be written: {error}", args.out.display()))?;
+    write(&args.out, &baked.bytes)?;
+    if let Some(path) = &args.numbers {
+        let bytes = baked.numbers.iter().flat_map(|number| number.to_le_bytes());
+        write(path, &bytes.collect::<Vec<_>>())?;
+    }
 
     let all = mesh.indices.len();
     let kept = all - baked.dropped;
@@ -77,9 +81,16 @@ fn bake(args: &Args) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    fs::write(path, bytes)
+        .map_err(|error| format!("{}: cannot be written: {error}", path.display()))
+}
+
 /// What was made.
 struct Baked {
     bytes: Vec<u8>,
+    /// Those that triangles had, then those that vertices had, if they are others now.
+    numbers: Vec<u32>,
     time: Duration,
     dropped: usize,
     /// Bytes of each part, of which there are any.
@@ -88,6 +99,7 @@ struct Baked {
 
 fn compact<N: WideNode>(mesh: &Mesh, in_file: MeshInFile) -> Result<Baked, Box<dyn Error>> {
     let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
+    let mut numbers = Vec::new();
     let start = Instant::now();
     let mut tree = builder().build_compact::<N>(&triangles)?;
     let time = start.elapsed();
@@ -105,13 +117,18 @@ fn compact<N: WideNode>(mesh: &Mesh, in_file: MeshInFile) -> Result<Baked, Box<d
         MeshInFile::AsItIs => with_mesh(&tree, &triangles)?,
         MeshInFile::Reordered => {
             let ReorderedMesh {
-                positions, indices, ..
+                positions,
+                indices,
+                vertices,
+                triangles,
             } = tree.reorder(&triangles)?;
+            numbers.extend(triangles.into_iter().chain(vertices));
             with_mesh(&tree, &TriangleMesh::new(&positions, &indices)?)?
         }
     };
     Ok(Baked {
         bytes,
+        numbers,
         time,
         dropped: tree.dropped(),
         parts,
@@ -126,6 +143,7 @@ fn full<N: WideNode>(mesh: &Mesh) -> Result<Baked, Box<dyn Error>> {
     let leaf_data = size_of_val(bvh.leaves()) + size_of_val(bvh.primitives());
     Ok(Baked {
         bytes: bvh.to_bytes()?,
+        numbers: Vec::new(),
         time,
         dropped: bvh.dropped(),
         parts: vec![
