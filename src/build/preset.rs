@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 52 to 75 | 0.78 |
-/// | [`Balanced`](Self::Balanced) | 320 to 470 | 0.96 |
-/// | [`Best`](Self::Best) | 730 to 1,360 | 1 |
+/// | [`Fast`](Self::Fast) | 51 to 66 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 260 to 390 | 0.96 |
+/// | [`Best`](Self::Best) | 640 to 1,200 | 1 |
 ///
 /// An EPYC of the first Zen generation takes some twice as long. What moves without changing can be
 /// [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.
