@@ -19,7 +19,7 @@ use bytemuck::Zeroable;
 use std::vec::Vec;
 
 /// Below this the heuristic is given up for halves: so a cut that takes off little each time costs neither the
-/// square of the time nor the stack, on which there are 64 levels, another 24 of halves and 63 of sweeps at most.
+/// square of the time nor the stack, on which there are 64 levels and another 24 of halves at most.
 const MAX_DEPTH: u32 = 64;
 
 /// With threads, so many references are one part.
@@ -95,7 +95,8 @@ impl<I: Input> Binned<'_, I> {
         Assembly::two(left, right)
     }
 
-    /// The same in one: the root to a place of `nodes`, those below it to their end. `first` is the place of `refs` in the order.
+    /// The same in one: the root to a place of `nodes`, those below it to their end. `first` is the place of `refs` in
+    /// the order.
     fn build(
         &self,
         refs: &mut [Ref],

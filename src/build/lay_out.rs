@@ -4,8 +4,10 @@
 //! node comes before those below it; what is below it is one range; and the leaves, from left to right, have
 //! the tree's order of primitives from its beginning to its end.
 
-use super::binary::{BinaryNode, BinaryTree};
-use super::pages;
+use super::{
+    binary::{BinaryNode, BinaryTree},
+    pages,
+};
 use crate::geometry::Aabb;
 use bytemuck::Zeroable;
 use core::ops::ControlFlow;

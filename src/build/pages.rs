@@ -19,7 +19,7 @@ pub(super) fn with_capacity<T>(capacity: usize) -> Vec<T> {
 pub(super) fn filled<T: Copy + Send>(value: T, len: usize) -> Vec<T> {
     let mut vector = with_capacity(len);
     #[cfg(feature = "rayon")]
-    if len * size_of::<T>() >= LARGE && rayon::current_num_threads() > 1 {
+    if len * size_of::<T>() >= LARGE && !super::parallel::is_alone() {
         use rayon::prelude::*;
         vector.par_extend(rayon::iter::repeat_n(value, len));
         return vector;
@@ -32,8 +32,8 @@ pub(super) fn filled<T: Copy + Send>(value: T, len: usize) -> Vec<T> {
 #[cfg(feature = "rayon")]
 const LARGE: usize = 1 << 18;
 
-/// A vector of `len`, on large pages if the system has them, of which every `chunk` are made in one go, at once with others. `make` is
-/// told which is the first of them; if it makes less than there is room for, there is no vector.
+/// A vector of `len`, on large pages if the system has them, of which every `chunk` are made in one go, at once with
+/// others. `make` is told which is the first of them; if it makes less than there is room for, the vector is empty.
 pub(super) fn made<T: Copy + Send>(
     len: usize,
     chunk: usize,

@@ -58,7 +58,7 @@ impl<L: Copy + Send + Sync> Sections<L> {
             Section::grow::<I, W>(input, ids, first, curve.measure, watch)
         };
         #[cfg(feature = "rayon")]
-        if rayon::current_num_threads() > 1 {
+        if !super::parallel::is_alone() {
             use rayon::prelude::*;
             let count = SECTIONS * rayon::current_num_threads();
             let primitives = (order.len() / count + 1).next_multiple_of(PART);

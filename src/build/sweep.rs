@@ -54,8 +54,8 @@ impl Leaves {
     }
 }
 
-/// Builds the tree over `refs`, at most [`MAX`] of them, which are left in its order, where their first place is `first`. Its root
-/// goes to a place of `nodes`, those below it to their end.
+/// Builds the tree over `refs`, at most [`MAX`] of them, which are left in its order, where their first place is
+/// `first`. Its root goes to a place of `nodes`, those below it to their end.
 pub(super) fn build<I: Input>(
     input: &I,
     refs: &mut [Ref],

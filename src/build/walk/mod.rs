@@ -40,7 +40,7 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         nodes: PhantomData,
     };
     #[cfg(feature = "rayon")]
-    if shape.len() > 4 * super::parallel::TASK && rayon::current_num_threads() > 1 {
+    if shape.len() > 4 * super::parallel::TASK && !super::parallel::is_alone() {
         return walk.at_once(root);
     }
     let mut walked = walk.below(root, 0, shape.len())?;
@@ -56,7 +56,8 @@ struct Walk<'a, N, T, const W: usize> {
     nodes: PhantomData<N>,
 }
 
-/// What a subtree becomes: its nodes, the root first, and its leaves. Places count from the root's and from the first leaf's.
+/// What a subtree becomes: its nodes, the root first, and its leaves. Places count from the root's and from the first
+/// leaf's.
 pub(super) struct Walked<N> {
     pub nodes: Vec<N>,
     /// Called as [`Shape::leaf`] does.
@@ -80,7 +81,8 @@ impl<const W: usize> Children<W> {
         lanes.map(|(lane, &child)| (child as usize, self.leaves >> lane & 1 != 0))
     }
 
-    /// The node over them, of which the first that is a node and the first that is a leaf have these places, and the others follow.
+    /// The node over them, of which the first that is a node and the first that is a leaf have these places, and the
+    /// others follow.
     #[inline(always)]
     fn node<N: WideNode>(&self, shape: &impl Shape<W>, node: usize, leaf: usize) -> N {
         let (mut node, mut leaf) = (node as u32, leaf as u32);
@@ -98,8 +100,8 @@ impl<const W: usize> Children<W> {
 }
 
 impl<N: WideNode, T: Shape<W> + Sync, const W: usize> Walk<'_, N, T, W> {
-    /// What becomes the children of a node, with so much of a walk's stack in use when it gets there; and how much is when it gets to
-    /// them.
+    /// What becomes the children of a node, with so much of a walk's stack in use when it gets there; and how much is
+    /// when it gets to them.
     #[inline(always)]
     fn children(&self, node: usize, used: usize) -> Result<(Children<W>, usize), BuildError> {
         let shape = self.shape;
