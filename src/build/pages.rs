@@ -102,3 +102,20 @@ fn ask_for_large_pages(start: *const u8, bytes: usize) {
 
 #[cfg(not(target_os = "linux"))]
 fn ask_for_large_pages(_: *const u8, _: usize) {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_are_made_or_none() {
+        // Three more than there is room for, as many, and one less in one chunk.
+        for (more, len) in [(3, 10), (0, 10), (-1, 0)] {
+            let numbers = made(10, 4, |first, slots| {
+                let count = slots.left() as isize + if first == 4 { more } else { 0 };
+                (first..first + count as usize).for_each(|number| slots.push(number));
+            });
+            assert!(numbers.iter().copied().eq(0..len));
+        }
+    }
+}
