@@ -39,8 +39,7 @@ pub(super) fn build<I: Input>(
     if refs.is_empty() {
         return Ok(BinaryTree::default());
     }
-    let tree = subtree(input, &mut refs, leaves, watch);
-    let tree = tree.tree();
+    let tree = subtree(input, &mut refs, leaves, watch).tree();
     watch.check()?;
     Ok(tree)
 }
