@@ -55,9 +55,9 @@ pub(super) fn subtree<I: Input>(
     let builder = Binned {
         input,
         leaves,
-        whole: match parallel::is_alone() {
-            true => usize::MAX,
-            false => PART,
+        whole: match parallel::threads() {
+            1 => usize::MAX,
+            _ => PART,
         },
         watch,
     };

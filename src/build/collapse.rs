@@ -14,7 +14,7 @@ use super::{
     emit::Shape,
     input::{Input, leaf_of},
     monitor::{STRIDE, Watch},
-    pages,
+    pages, parallel,
     sweep::Leaves,
 };
 use crate::{
@@ -158,13 +158,7 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
                 watch,
             });
         };
-        #[cfg(feature = "rayon")]
-        {
-            use rayon::prelude::*;
-            slices.into_par_iter().for_each(solve);
-        }
-        #[cfg(not(feature = "rayon"))]
-        slices.into_iter().for_each(solve);
+        parallel::map(slices, solve);
 
         self.backend.run(SolveRest {
             solver: self,
@@ -205,14 +199,9 @@ impl<const W: usize, I: Input> Solver<'_, W, I> {
         let area = self.measure.half_area(&aabb);
         if self.nodes[node].is_leaf() {
             // Those of leaves to come, in case they are to be one.
-            for place in first..first + count {
-                let order = self.order;
-                if let Some(&id) = order.get((place as usize).wrapping_sub(2 * AHEAD)) {
-                    self.input.fetch_place(token, id);
-                }
-                if let Some(&id) = order.get((place as usize).wrapping_sub(AHEAD)) {
-                    self.input.fetch(token, self.input.place(id));
-                }
+            for place in first as usize..(first + count) as usize {
+                let soon = [1, 2].map(|times| place.wrapping_sub(times * AHEAD));
+                self.input.fetch_of(token, self.order, soon);
             }
             return Entry {
                 forest: [area * I::leaf_cost(count as usize); MAX_WIDTH],

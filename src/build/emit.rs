@@ -8,6 +8,7 @@ use super::{
     input::{Input, LeafOf},
     monitor::Watch,
     pages::{self, Slots},
+    parallel,
     walk::{Walked, walk},
 };
 use crate::{
@@ -118,13 +119,7 @@ fn fill<I: Input>(
     watch: &Watch,
 ) -> Result<(Vec<I::Leaf>, Vec<u32>), LayoutError> {
     let list = |ranges: &[Range<usize>]| List::new(input, order, ranges);
-    #[cfg(feature = "rayon")]
-    let mut lists: Vec<_> = {
-        use rayon::prelude::*;
-        ranges.par_chunks(CHUNK).map(list).collect()
-    };
-    #[cfg(not(feature = "rayon"))]
-    let mut lists: Vec<_> = ranges.chunks(CHUNK).map(list).collect();
+    let mut lists = parallel::map(ranges.chunks(CHUNK), list);
     let mut primitives = pages::with_capacity(order.len());
     for list in &mut lists {
         list.first = primitives.len() as u32;
@@ -209,12 +204,8 @@ impl<I: Input> Operation for Fill<'_, '_, I> {
         let mut start = 0;
         for (leaf, &end) in list.ends.iter().enumerate() {
             for place in start..end {
-                if let Some(&id) = primitives.get(place + 2 * AHEAD) {
-                    input.fetch_place(token, id);
-                }
-                if let Some(&id) = primitives.get(place + AHEAD) {
-                    input.fetch(token, input.place(id));
-                }
+                let soon = [1, 2].map(|times| place + times * AHEAD);
+                input.fetch_of(token, primitives, soon);
             }
             let filled = LeafOf {
                 input,

@@ -65,6 +65,17 @@ pub(super) trait Input: Sync {
     fn fetch_place<S: Simd>(&self, token: S, id: u32);
     /// Has fetched what [`load_from`](Self::load_from) reads.
     fn fetch<S: Simd>(&self, token: S, place: Self::Place);
+    /// Has fetched what a leaf has of the primitive at the first of these places in `ids`, and where that of the second is, if
+    /// they are there.
+    #[inline(always)]
+    fn fetch_of<S: Simd>(&self, token: S, ids: &[u32], [soon, later]: [usize; 2]) {
+        if let Some(&id) = ids.get(later) {
+            self.fetch_place(token, id);
+        }
+        if let Some(&id) = ids.get(soon) {
+            self.fetch(token, self.place(id));
+        }
+    }
     /// What a leaf has of a primitive.
     #[inline(always)]
     fn load(&self, id: u32) -> Self::Loaded {

@@ -100,9 +100,6 @@ impl<I: Input, const W: usize> Operation for Solve<'_, I, W> {
             ..
         } = self;
         let nodes = &nodes[all.len()..];
-        if all.is_empty() {
-            all = pages::with_capacity(nodes.len());
-        }
         let mut all_cuts = pages::with_capacity(nodes.len());
         for node in nodes {
             let area = measure.half_area(&node.aabb);

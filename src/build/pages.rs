@@ -19,7 +19,7 @@ pub(super) fn with_capacity<T>(capacity: usize) -> Vec<T> {
 pub(super) fn filled<T: Copy + Send>(value: T, len: usize) -> Vec<T> {
     let mut vector = with_capacity(len);
     #[cfg(feature = "rayon")]
-    if len * size_of::<T>() >= LARGE && !super::parallel::is_alone() {
+    if len * size_of::<T>() >= LARGE && super::parallel::threads() > 1 {
         use rayon::prelude::*;
         vector.par_extend(rayon::iter::repeat_n(value, len));
         return vector;

@@ -182,7 +182,7 @@ impl Clusters {
             });
         };
         #[cfg(feature = "rayon")]
-        if slots.len() > 4 * super::parallel::TASK {
+        if super::parallel::is_worth_it(slots.len()) {
             use super::parallel::TASK;
             use rayon::prelude::*;
             let chunks = slots.par_chunks_mut(TASK).enumerate();

@@ -5,7 +5,7 @@ use super::{
     cost::Measure,
     input::{Input, Verdict},
     monitor::Watch,
-    pages,
+    pages, parallel,
 };
 use crate::{
     geometry::{Aabb, TriangleMesh},
@@ -228,13 +228,7 @@ pub(super) fn gather<I: Input, T: Copy + Send>(
             make: &make,
         })
     };
-    #[cfg(feature = "rayon")]
-    let gathered: Vec<_> = {
-        use rayon::prelude::*;
-        all.par_chunks_mut(CHUNK).enumerate().map(gather).collect()
-    };
-    #[cfg(not(feature = "rayon"))]
-    let gathered: Vec<_> = all.chunks_mut(CHUNK).enumerate().map(gather).collect();
+    let gathered = parallel::map(all.chunks_mut(CHUNK).enumerate(), gather);
 
     // Close the gaps that primitives left out have left at the chunks' ends.
     let (mut kept, mut dropped, mut bounds) = (0, 0, Bounds::EMPTY);

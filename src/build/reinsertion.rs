@@ -101,13 +101,7 @@ pub(super) fn optimize(
             true => find(&spots, from),
             false => Search::NONE,
         };
-        #[cfg(feature = "rayon")]
-        let searches: Vec<_> = {
-            use rayon::prelude::*;
-            candidates.par_iter().map(find).collect()
-        };
-        #[cfg(not(feature = "rayon"))]
-        let searches: Vec<_> = candidates.iter().map(find).collect();
+        let searches = parallel::map(&candidates, find);
         for (&from, search) in candidates.iter().zip(&searches) {
             rests[from as usize].note(search.best.is_some());
             looks += search.looks;
@@ -340,7 +334,7 @@ fn refit_up(spots: &mut [Spot], mut index: u32) {
 
 /// The changed tree, in our order.
 fn changed(tree: &BinaryTree, spots: &[Spot]) -> BinaryTree {
-    let levels = if parallel::is_alone() { 0 } else { LEVELS };
+    let levels = if parallel::threads() == 1 { 0 } else { LEVELS };
     // As if all parts were as large.
     let leaves = tree.nodes().len() >> (levels + 1);
     below(tree, spots, 0, levels, leaves).tree()

@@ -8,19 +8,18 @@ use super::{
     leaf_collapse::solve,
     monitor::Watch,
     morton::Curve,
-    pages,
+    pages, parallel,
     ploc::{self, Node},
     runs::{self, Runs},
 };
 use core::mem::take;
-use std::{vec, vec::Vec};
+use std::vec::Vec;
 
 /// So many primitives are one part of a section: what is joined of them is on one core, and in its cache.
 const PART: usize = 1 << 12;
 /// One of so many clusters of a part is left for those of other parts to be joined with.
 const LEFT: usize = 16;
 /// With threads, so many sections are for each.
-#[cfg(feature = "rayon")]
 const SECTIONS: usize = 16;
 
 /// All sections, of as many primitives each, but for the last.
@@ -54,23 +53,15 @@ impl<L: Copy + Send + Sync> Sections<L> {
     ) -> Result<Self, BuildError> {
         let order = &curve.order[..];
         watch.phase(0.85, 2 * order.len())?;
-        let grow = |(first, ids): (usize, &[u32])| {
-            Section::grow::<I, W>(input, ids, first, curve.measure, watch)
+        let primitives = match parallel::threads() {
+            1 => order.len() + 1,
+            threads => (order.len() / (SECTIONS * threads) + 1).next_multiple_of(PART),
         };
-        #[cfg(feature = "rayon")]
-        if !super::parallel::is_alone() {
-            use rayon::prelude::*;
-            let count = SECTIONS * rayon::current_num_threads();
-            let primitives = (order.len() / count + 1).next_multiple_of(PART);
-            let firsts = (0..order.len()).into_par_iter().step_by(primitives);
-            let all = firsts.zip(order.par_chunks(primitives)).map(grow);
-            let all = all.collect();
-            watch.check()?;
-            return Ok(Self { all, primitives });
-        }
-        let all = vec![grow((0, order))];
+        let grow = |(section, ids): (usize, &[u32])| {
+            Section::grow::<I, W>(input, ids, section * primitives, curve.measure, watch)
+        };
+        let all = parallel::map(order.chunks(primitives).enumerate(), grow);
         watch.check()?;
-        let primitives = order.len() + 1;
         Ok(Self { all, primitives })
     }
 
@@ -134,13 +125,7 @@ impl<L: Copy + Send + Sync> Sections<L> {
             }
             <[_]>::copy_from_slice(cuts, &section.cuts);
         };
-        #[cfg(feature = "rayon")]
-        {
-            use rayon::prelude::*;
-            copies.into_par_iter().for_each(copy);
-        }
-        #[cfg(not(feature = "rayon"))]
-        copies.into_iter().for_each(copy);
+        parallel::map(copies, copy);
         (nodes, cuts)
     }
 }
@@ -186,7 +171,7 @@ impl<L: Copy> Section<L> {
             let until = clusters.len() / LEFT;
             roots.extend(ploc::join(&mut nodes, clusters, until, scale, watch));
         }
-        let (forests, cuts) = solve::<I, W>(&nodes, Vec::new(), measure);
+        let (forests, cuts) = solve::<I, W>(&nodes, pages::with_capacity(nodes.len()), measure);
         let forests = roots.iter().map(|&root| forests[root as usize]).collect();
         Self {
             leaves,

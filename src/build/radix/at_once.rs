@@ -1,6 +1,7 @@
 //! The sort by many threads. No two write to one place, which the compiler is told by atomics: they are as fast.
 
 use super::{CELLS, by_digit, digit, id, pages, to_starts};
+use crate::build::parallel::threads;
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 use rayon::prelude::*;
 use std::vec::Vec;
@@ -21,7 +22,7 @@ pub(super) fn sorted(keys: Vec<u64>) -> Vec<u32> {
 }
 
 fn sort(place: usize, keys: &[AtomicU64], put: impl Fn(usize, u64) + Sync) {
-    let runs = rayon::current_num_threads().min(MOST_RUNS);
+    let runs = threads().min(MOST_RUNS);
     let runs = keys.par_chunks(keys.len().div_ceil(runs));
     let count = |keys: &[AtomicU64]| {
         let mut counts = [0; CELLS];

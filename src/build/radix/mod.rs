@@ -19,7 +19,7 @@ fn id(key: u64) -> u32 {
 /// The numbers in keys, which are in order below the code, in the order of keys.
 pub(super) fn sorted(mut keys: Vec<u64>) -> Vec<u32> {
     #[cfg(all(feature = "rayon", target_has_atomic = "64"))]
-    if keys.len() > 4 * super::parallel::TASK && !super::parallel::is_alone() {
+    if super::parallel::is_worth_it(keys.len()) {
         return at_once::sorted(keys);
     }
     let mut counts = [[0; CELLS]; DIGITS];

@@ -40,7 +40,7 @@ pub(super) fn walk<N: WideNode, const W: usize>(
         nodes: PhantomData,
     };
     #[cfg(feature = "rayon")]
-    if shape.len() > 4 * super::parallel::TASK && !super::parallel::is_alone() {
+    if super::parallel::is_worth_it(shape.len()) {
         return walk.at_once(root);
     }
     let mut walked = walk.below(root, 0, shape.len())?;
