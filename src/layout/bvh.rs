@@ -10,6 +10,9 @@ use crate::{
 };
 use core::fmt;
 
+/// Caches are likely to hold what is over no more primitives than this.
+const LARGE: usize = 1 << 18;
+
 /// A wide bounding volume hierarchy: nodes `N`, leaves `L`, memory of `S`.
 ///
 /// Built by [`Builder`](crate::build::Builder), opened by [`from_bytes`](Bvh::from_bytes), or put together by
@@ -116,6 +119,12 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// How the leaves are kept.
     pub(super) fn leaf_store(&self) -> &L::Store<S> {
         &self.leaves
+    }
+
+    /// Whether it is more than the caches are likely to hold.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        self.primitives().len() > LARGE
     }
 
     /// Has fetched what is read next of the leaf at a place: [`Leaves::fetch_next`].

@@ -25,6 +25,7 @@ mod bundle;
 mod classes;
 mod count;
 mod feed;
+mod guess;
 mod one_by_one;
 mod primitives;
 mod query;

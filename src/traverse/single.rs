@@ -1,6 +1,9 @@
 //! The walk of one ray through a hierarchy.
 
-use super::boxes::{AtOnce, Boxes};
+use super::{
+    boxes::{AtOnce, Boxes},
+    guess::guessed,
+};
 use crate::{
     layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
     simd::Simd,
@@ -11,7 +14,7 @@ use core::{mem::MaybeUninit, ops::ControlFlow, ptr};
 /// What is done on the way.
 pub(crate) trait Visitor<L: Leaves> {
     /// Whether children are wanted the nearest first. Any order will do to find out that something is
-    /// in the way.
+    /// in the way, and then the `t` up to which to look on stays as it is.
     const NEAREST_FIRST: bool;
 
     /// A node is tested.
@@ -82,6 +85,8 @@ pub(super) fn walk_boxes<
 ) {
     let margin = boxes.margin();
     let mut t_max = reach_of(t_max, margin);
+    // Where any order will do, what is guessed is mostly right, and what caches hold is there in time.
+    let fetches = V::NEAREST_FIRST || bvh.is_large();
     // Apart, so that the length stays in a register and nothing is cleared.
     let mut stack: Stack = [MaybeUninit::uninit(); STACK];
     let mut len = 0;
@@ -91,18 +96,24 @@ pub(super) fn walk_boxes<
             visitor.node();
             // SAFETY: the layout's check saw that all nodes led to are there.
             let node = unsafe { bvh.node(current) };
-            // Read when it is known which, too late to wait for a line that the boxes were not in.
-            N::prefetch_links(token, ptr::from_ref(node).cast());
+            if fetches {
+                // Read when it is known which, too late to wait for a line that the boxes were not in.
+                N::prefetch_links(token, ptr::from_ref(node).cast());
+            }
             let (mut mask, near) = boxes.test(node, t_max);
             if mask == 0 {
-                match pop(&stack, &mut len, t_max) {
+                match pop::<L, V>(&stack, &mut len, t_max) {
                     Some(link) => current = link,
                     None => return,
                 }
                 continue;
             }
-            let first = mask.trailing_zeros() as usize;
+            let mut first = mask.trailing_zeros() as usize;
             mask &= mask - 1;
+            // Of several the nearest is found by numbers, which takes less than guesses that are wrong.
+            if mask == 0 || !V::NEAREST_FIRST {
+                first = guessed(first);
+            }
             // SAFETY: `mask` has bits for the node's lanes alone.
             current = unsafe { node.link(first) };
             if mask == 0 {
@@ -110,7 +121,14 @@ pub(super) fn walk_boxes<
             }
             let near = B::nears(near);
             // SAFETY: `mask` has a bit for the lane, and bits for the node's lanes alone.
-            let entry = |lane: usize| unsafe { Entry::new(B::near(&near, lane), node.link(lane)) };
+            let entry = |lane: usize| unsafe {
+                let near = if V::NEAREST_FIRST {
+                    B::near(&near, lane)
+                } else {
+                    0.0
+                };
+                Entry::new(near, node.link(lane))
+            };
             let mut nearest = entry(first);
             let base = len;
             loop {
@@ -123,8 +141,9 @@ pub(super) fn walk_boxes<
                 } else {
                     other
                 };
-                let link = farther.link();
-                bvh.prefetch(token, link);
+                if fetches {
+                    bvh.prefetch(token, farther.link());
+                }
                 // SAFETY: the layout's check saw that a walk never leaves more than `STACK`
                 // children behind.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
@@ -147,21 +166,21 @@ pub(super) fn walk_boxes<
             ControlFlow::Continue(t) => t_max = reach_of(t, margin),
         }
         boxes.renew();
-        match pop(&stack, &mut len, t_max) {
+        match pop::<L, V>(&stack, &mut len, t_max) {
             Some(link) => current = link,
             None => return,
         }
     }
 }
 
-/// The last child left behind that is still near enough.
+/// The last child left behind that is still near enough: all are where no `t` was kept, for their range never shrinks.
 #[inline(always)]
-fn pop(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Link> {
+fn pop<L: Leaves, V: Visitor<L>>(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Link> {
     while *len > 0 {
         *len -= 1;
         // SAFETY: those below the length were written.
         let entry = unsafe { stack.get_unchecked(*len).assume_init() };
-        if entry.near() <= t_max {
+        if !V::NEAREST_FIRST || entry.near() <= t_max {
             return Some(entry.link());
         }
     }

@@ -38,10 +38,6 @@ const ENDED: u32 = u32::MAX;
 /// As many of a stack's entries are looked at together.
 const FEW: usize = 8;
 
-/// Over more primitives than this nodes' links are fetched, too, and of leaves that say where to read on what is there. Smaller
-/// scenes are in the caches.
-const LARGE: usize = 1 << 18;
-
 /// A ray under way.
 #[repr(C, align(64))]
 pub(super) struct Lane {
@@ -89,7 +85,8 @@ pub(super) fn trace<
     let (mut nodes, mut rest) = (0, 0);
     // What comes after nodes.
     let (mut at_leaf, mut at_end) = (List::EMPTY, List::EMPTY);
-    let is_large = bvh.primitives().len() > LARGE;
+    // Then nodes' links are fetched, too, and of leaves that say where to read on what is there.
+    let is_large = bvh.is_large();
     if bvh.root() == Child::EMPTY {
         while let Some((index, ..)) = feed.next() {
             feed.answer(index, None);
