@@ -2,7 +2,7 @@
 
 use super::{
     boxes::{AtOnce, Boxes},
-    guess::guessed,
+    guess::guessed_lowest,
 };
 use crate::{
     layout::{Bvh, Child, Leaves, Link, STACK, Storage, WideNode},
@@ -108,12 +108,13 @@ pub(super) fn walk_boxes<
                 }
                 continue;
             }
-            let mut first = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
             // Of several the nearest is found by numbers, which takes less than guesses that are wrong.
-            if mask == 0 || !V::NEAREST_FIRST {
-                first = guessed(first);
-            }
+            let first = if mask & (mask - 1) == 0 || !V::NEAREST_FIRST {
+                guessed_lowest(mask)
+            } else {
+                mask.trailing_zeros() as usize
+            };
+            mask &= mask - 1;
             // SAFETY: `mask` has bits for the node's lanes alone.
             current = unsafe { node.link(first) };
             if mask == 0 {
