@@ -38,7 +38,7 @@ const MAX_RECIPROCAL: f32 = pow2(48);
 
 /// 1 / direction, a component, no greater in magnitude than [`MAX_RECIPROCAL`].
 #[inline(always)]
-pub(super) fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
+pub(crate) fn reciprocal<const N: usize, V: Vector<N>>(token: V::Token, direction: V) -> V {
     (V::splat(token, 1.0) / direction)
         .max(V::splat(token, -MAX_RECIPROCAL))
         .min(V::splat(token, MAX_RECIPROCAL))

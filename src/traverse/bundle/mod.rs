@@ -9,10 +9,12 @@
 //! Akenine-Möller, "Dynamic ray stream traversal" (2014).
 
 mod packet;
+mod shears;
 mod ways;
 
 use self::{
-    packet::{Asked, Packet, V},
+    packet::Packet,
+    shears::{Asked, Shears, V},
     ways::{Entry, Ways, insert},
 };
 use super::{query::Query, triangles::Found};
@@ -110,13 +112,13 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
     for (index, (rays, answers)) in packets.enumerate() {
         let found = bundle.found >> (LANES * index);
-        let packet = bundle.packet(index);
+        let shears = &bundle.packet(index).shears;
         let (t, u, v) = (
-            packet.t_max.to_array(),
-            packet.u.to_array(),
-            packet.v.to_array(),
+            shears.t_max.to_array(),
+            shears.u.to_array(),
+            shears.v.to_array(),
         );
-        let places = packet.places.to_array();
+        let places = shears.places.to_array();
         for (lane, (ray, answer)) in rays.iter().zip(answers).enumerate() {
             let lane = lane % LANES;
             *answer = if found >> lane & 1 == 0 {
@@ -198,7 +200,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             extent = extent.max(extents);
             start = start.min(starts);
             far = far.max(packet.far);
-            let ([x, y], zero) = (packet.slope, V::<T>::splat(token, 0.0));
+            let ([x, y], zero) = (packet.shears.slope, V::<T>::splat(token, 0.0));
             let [up, down] = &mut steepest;
             *up = [up[0].max(x), up[1].max(y)];
             *down = [down[0].max(zero - x), down[1].max(zero - y)];
@@ -212,8 +214,8 @@ impl<'a, T: Simd> Bundle<'a, T> {
         let mut bundling = Bundling::new(token, crossing(rays, bounds), extent);
         for packet in &packets[..count] {
             // SAFETY: just written.
-            let Packet { origin, slabs, .. } = unsafe { packet.assume_init_ref() };
-            bundling.add(token, *origin, slabs.reciprocals());
+            let Packet { slabs, shears, .. } = unsafe { packet.assume_init_ref() };
+            bundling.add(token, shears.origin, slabs.reciprocals());
         }
         Some(Self {
             rays,
@@ -414,6 +416,9 @@ impl<'a, T: Simd> Bundle<'a, T> {
             }
             return self.note::<Q>(token, new);
         }
+        if !Q::CLOSEST && packets_of(rays) > rays.count_ones().div_ceil(LANES as u32) {
+            return self.test_leaf_brought_together::<Q>(token, leaf, primitives, rays);
+        }
         let (mut from, mut room) = (0, MaybeUninit::uninit());
         while from < leaf.count() {
             let triangles = leaf.gather(from, &mut room);
@@ -428,6 +433,48 @@ impl<'a, T: Simd> Bundle<'a, T> {
                     packet.test_leaf::<Q, _>(token, triangles, primitives, asked)
                 };
                 new |= u64::from(of_packet) << (LANES * index);
+            }
+            self.note::<Q>(token, new);
+        }
+    }
+
+    /// The same for rays that are spread over more packets than they would fill, of which each may be hit by any: eight at
+    /// a time, whatever packets they are of.
+    #[inline(always)]
+    fn test_leaf_brought_together<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: impl Gather,
+        primitives: &[u32],
+        rays: u64,
+    ) {
+        let (mut from, mut room) = (0, MaybeUninit::uninit());
+        while from < leaf.count() {
+            let triangles = leaf.gather(from, &mut room);
+            from += triangles.count();
+            let (mut new, mut left) = (0, rays & self.looking);
+            while left != 0 {
+                let (mut numbers, mut group) = ([0; LANES], [PreparedRay::ROOM; LANES]);
+                let mut count = 0;
+                for (number, ray) in numbers.iter_mut().zip(&mut group) {
+                    if left == 0 {
+                        break;
+                    }
+                    *number = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    *ray = *self.rays.get(*number).unwrap_or(&PreparedRay::ROOM);
+                    count += 1;
+                }
+                let asked = Asked {
+                    lanes: u32::MAX >> (32 - count),
+                    found: 0,
+                    rays: &group,
+                    axes: self.axes,
+                };
+                let mut shears = Shears::of(token, &group, *self.axes);
+                for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
+                    new |= 1 << numbers[lane % LANES];
+                }
             }
             self.note::<Q>(token, new);
         }
@@ -459,6 +506,16 @@ impl<'a, T: Simd> Bundle<'a, T> {
             self.far = most(far);
         }
     }
+}
+
+/// How many packets have any of the rays.
+#[inline(always)]
+fn packets_of(rays: u64) -> u32 {
+    const { assert!(LANES == 8) };
+    // Each packet's bits brought down to its lowest.
+    let pairs = rays | rays >> 4;
+    let ones = pairs | pairs >> 2;
+    ((ones | ones >> 1) & 0x0101_0101_0101_0101).count_ones()
 }
 
 /// The first packet that has any of the rays. Takes its rays from them.

@@ -1,0 +1,179 @@
+//! Eight rays as triangles see them, a lane each.
+
+use super::LANES;
+use crate::{
+    geometry::Ray,
+    layout::{Gathered, Triangles},
+    primitive::{
+        exact::{Pair, Pairs},
+        triangle::{Along, Edges, Sheared, bits},
+    },
+    simd::{Lanes, Simd, Vector, load_all, splat3},
+    slab::{PreparedRay, reciprocal},
+    traverse::query::Query,
+};
+
+/// A number of each ray of a packet.
+pub(super) type V<T> = <T as Simd>::F32x8;
+
+/// Which of a packet's rays are asked for triangles.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    /// A bit each.
+    pub(super) lanes: u32,
+    /// The lanes that have found something.
+    pub(super) found: u32,
+    /// The packet's, and those after it.
+    pub(super) rays: &'a [Ray],
+    /// Of the shear.
+    pub(super) axes: &'static [usize; 3],
+}
+
+/// What the triangle test needs of eight rays, and what it has found.
+pub(super) struct Shears<T: Simd> {
+    pub(super) origin: [V<T>; 3],
+    pub(super) slope: [V<T>; 2],
+    pub(super) along: Along<V<T>>,
+    /// The best hits so far, in the lanes that have one.
+    pub(super) t_max: V<T>,
+    pub(super) u: V<T>,
+    pub(super) v: V<T>,
+    /// Their places in the list of primitive numbers, as bits.
+    pub(super) places: V<T>,
+}
+
+impl<T: Simd> Shears<T> {
+    /// Of rays that have found nothing so far. `reciprocal` is of the direction along the last of the axes of the shear.
+    #[inline(always)]
+    pub(super) fn new(
+        token: T,
+        origin: [V<T>; 3],
+        direction: [V<T>; 3],
+        [t_min, t_max]: [V<T>; 2],
+        reciprocal: V<T>,
+        [kx, ky, _]: [usize; 3],
+    ) -> Self {
+        let zero = V::<T>::splat(token, 0.0);
+        Self {
+            origin,
+            slope: [direction[kx] * reciprocal, direction[ky] * reciprocal],
+            along: Along { reciprocal, t_min },
+            t_max,
+            u: zero,
+            v: zero,
+            places: zero,
+        }
+    }
+
+    /// The same of prepared rays, each as its caller gave it.
+    #[inline(always)]
+    pub(super) fn of(token: T, rays: &[Ray; LANES], axes: [usize; 3]) -> Self {
+        let rows: &[[f32; 8]; LANES] = bytemuck::cast_ref(rays);
+        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(load_all(token, rows));
+        let direction = [dx, dy, dz];
+        let along = reciprocal(token, direction[axes[2]]);
+        Self::new(token, [ox, oy, oz], direction, [t_min, t_max], along, axes)
+    }
+
+    /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
+    #[inline(always)]
+    pub(super) fn test<Q: Query, G: Gathered>(
+        &mut self,
+        token: T,
+        triangles: G,
+        primitives: &[u32],
+        asked: Asked,
+    ) -> u32 {
+        let Asked {
+            mut lanes,
+            mut found,
+            rays,
+            axes,
+        } = asked;
+        let leaf = triangles.stored();
+        let [kx, ky, kz] = *axes;
+        // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
+        unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
+        let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
+        let nowhere = [V::<T>::splat(token, 0.0); 3];
+        let mut vertices = [Sheared::new(nowhere, nowhere, [nowhere[0]; 2]); 8];
+        let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
+        for vertex in 0..8 {
+            let position = splat3(token, [x[vertex], y[vertex], z[vertex]]);
+            vertices[vertex] = Sheared::new(position, origin, self.slope);
+        }
+        let mut new = 0;
+        for triangle in 0..triangles.count() % 16 {
+            let place = triangles.first() + triangle;
+            let triangle = triangle % 8;
+            let [a, b, c] = &leaf.corners;
+            let [a, b, c] = [
+                vertices[a[triangle] as usize % 8],
+                vertices[b[triangle] as usize % 8],
+                vertices[c[triangle] as usize % 8],
+            ];
+            let corners = [[a.x, b.x, c.x], [a.y, b.y, c.y], [a.z, b.z, c.z]];
+            let mut edges = Edges::new(token, corners, lanes);
+            let pairs = OneTriangle {
+                triangles,
+                triangle,
+                rays,
+                axes,
+            };
+            if !Q::CLOSEST {
+                // Not all lanes that are hit at once, but some if there are any.
+                while edges.candidates != 0 {
+                    let hits = (self.along).test::<LANES, false, G::Precision, _>(
+                        token, corners, edges, self.t_max, pairs,
+                    );
+                    if hits.mask == 0 {
+                        break;
+                    }
+                    new |= hits.mask;
+                    lanes &= !hits.mask;
+                    edges.candidates &= !hits.mask;
+                }
+                continue;
+            }
+            if edges.candidates == 0 {
+                continue;
+            }
+            let hits = (self.along)
+                .test::<LANES, true, G::Precision, _>(token, corners, edges, self.t_max, pairs);
+            let nearer = hits.t.lt(self.t_max).bits() | !found;
+            let mut closer = hits.mask & nearer;
+            for lane in bits(hits.mask & !nearer) {
+                // As near as the best one: the lesser number.
+                let best = self.places.to_array()[lane % LANES].to_bits() as usize;
+                closer |= u32::from(primitives[place] < primitives[best]) << lane;
+            }
+            let set = V::<T>::of_bits(token, closer);
+            self.t_max = set.select(hits.t, self.t_max);
+            self.u = set.select(hits.u, self.u);
+            self.v = set.select(hits.v, self.v);
+            let places = V::<T>::splat(token, f32::from_bits(place as u32));
+            self.places = set.select(places, self.places);
+            found |= closer;
+            new |= closer;
+        }
+        new
+    }
+}
+
+/// The rays of a packet against one triangle of a leaf.
+#[derive(Clone, Copy)]
+struct OneTriangle<'a, R> {
+    triangles: R,
+    triangle: usize,
+    rays: &'a [Ray],
+    axes: &'static [usize; 3],
+}
+
+impl<R: Triangles> Pairs for OneTriangle<'_, R> {
+    #[inline(always)]
+    fn pair(&self, lane: usize) -> Pair {
+        // Lanes past the last ray are not among those that are asked for.
+        let ray = self.rays.get(lane).unwrap_or(&PreparedRay::ROOM);
+        Pair::new(&self.triangles.triangle(self.triangle), ray, self.axes)
+    }
+}
