@@ -1,7 +1,7 @@
 //! Many rays a call.
 
 use super::{
-    bundle,
+    bundle::{self, Tightness},
     classes::{self, Patience},
     feed::{self, Feed},
     query::{AnyHit, ClosestHit, Query},
@@ -284,7 +284,13 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Op
             }
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
-        let outcome = bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, &mut found[..count]);
+        let outcome = bundle::trace::<T, N, L, S, Q>(
+            token,
+            self.bvh,
+            rays,
+            &mut found[..count],
+            &mut Tightness::default(),
+        );
         if !outcome.is_traced() {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = Q::one(self.bvh, ray);

@@ -4,7 +4,7 @@
 //! border between two classes, its rays make a bundle each class.
 
 use super::{
-    bundle::{self, Outcome},
+    bundle::{self, Outcome, Tightness},
     query::Query,
 };
 use crate::{
@@ -27,6 +27,8 @@ pub(super) struct Patience {
     loose: Pause,
     /// Classes.
     unlike: Pause,
+    /// Of the bundles so far.
+    tightness: Tightness,
 }
 
 /// For how many runs of rays something is not tried: the more, the more often it was of no use.
@@ -91,7 +93,8 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             }
             (&gathered[..count], &mut found[..count])
         };
-        let outcome = bundle::trace::<T, N, L, S, Q>(token, bvh, part, out);
+        let outcome =
+            bundle::trace::<T, N, L, S, Q>(token, bvh, part, out, &mut patience.tightness);
         let (alike, tight) = (outcome != Outcome::Unlike, outcome == Outcome::Tight);
         if whole {
             if alike {

@@ -10,7 +10,10 @@
 
 mod packet;
 mod shears;
+mod tightness;
 mod ways;
+
+pub(super) use self::tightness::Tightness;
 
 use self::{
     packet::Packet,
@@ -44,9 +47,6 @@ const FEW_OF_A_PACKET: u32 = 3;
 /// How far apart the rays of a bundle may go, across for one along their largest component.
 const SPREAD: f32 = 0.5;
 
-/// A bundle is loose if fewer rays, in eighths, pass a box for each test of a packet: of the eight that are tested at once
-/// hardly one goes on. Waves are faster then.
-const LEAST_PASSES: usize = 9;
 /// From so many tests a ray on a loose bundle is given up: before, it cannot be told.
 const TRIED: usize = 1;
 /// From so many on it is not: most is done.
@@ -66,10 +66,7 @@ struct Bundle<'a, T: Simd> {
     looking: u64,
     /// Those that have found something.
     found: u64,
-    /// How many boxes packets were tested against.
-    tests: usize,
-    /// How many boxes of those each ray passed, in all.
-    passes: usize,
+    tightness: Tightness,
 }
 
 /// What has come of a bundle.
@@ -92,13 +89,15 @@ impl Outcome {
     }
 }
 
-/// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike.
+/// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike. `before` is of the bundles
+/// traced before, and then of this one, too.
 #[inline(always)]
 pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
     token: T,
     bvh: &Bvh<N, L, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
+    before: &mut Tightness,
 ) -> Outcome {
     if bvh.root() == Child::EMPTY {
         return Outcome::Unlike;
@@ -106,7 +105,9 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
         return Outcome::Unlike;
     };
-    if !bundle.walk::<N, L, S, Q>(token, bvh) {
+    let traced = bundle.walk::<N, L, S, Q>(token, bvh);
+    *before = before.with(bundle.tightness);
+    if !traced {
         return Outcome::GivenUp;
     }
     let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
@@ -134,7 +135,8 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             };
         }
     }
-    if bundle.is_loose() {
+    // Where there are waves they are faster then.
+    if bundle.tightness.is_loose() || T::INTERLEAVES && before.is_loose_on_the_whole() {
         Outcome::Loose
     } else {
         Outcome::Tight
@@ -226,8 +228,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             far: most(far),
             looking: u64::MAX >> (RAYS - rays.len().min(RAYS)),
             found: 0,
-            tests: 0,
-            passes: 0,
+            tightness: Tightness::default(),
         })
     }
 
@@ -236,11 +237,6 @@ impl<'a, T: Simd> Bundle<'a, T> {
         debug_assert!(index < self.count);
         // SAFETY: callers' indices are below `count`, and those were written.
         unsafe { self.packets.get_unchecked_mut(index).assume_init_mut() }
-    }
-
-    #[inline(always)]
-    fn is_loose(&self) -> bool {
-        8 * self.passes < LEAST_PASSES * self.tests
     }
 
     /// Finds what all rays find, unless that is given up.
@@ -291,7 +287,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 let [near, far] = parent.child_planes(entry.lane as usize, direction);
                 rays = self.passing(token, near, far, rays);
                 if rays != 0 {
-                    if given_up_at.contains(&self.tests) && self.is_loose() {
+                    if given_up_at.contains(&self.tightness.tests()) && self.tightness.is_loose() {
                         return false;
                     }
                     break;
@@ -398,8 +394,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             passing |= u64::from(hit.bits()) << (LANES * index);
         }
         passing &= rays;
-        self.tests += tests;
-        self.passes += passing.count_ones() as usize;
+        self.tightness.add(tests, passing.count_ones() as usize);
         passing
     }
 
