@@ -1,0 +1,142 @@
+//! A bundle at a leaf: packets against its triangles, or, where rays are few, a ray against all of them. To find any hit, rays
+//! that are scattered over packets are put into new ones.
+
+use super::{
+    Bundle, LANES, first_packet,
+    shears::{Asked, Shears, V},
+};
+use crate::{
+    layout::{Gather, Triangles},
+    primitive::triangle::bits,
+    simd::{Lanes, Simd, Vector},
+    slab::{PreparedRay, most},
+    traverse::query::Query,
+};
+use core::mem::MaybeUninit;
+
+/// No more rays than this at a leaf are tested one by one, against its triangles where they are.
+const FEW_AT_LEAF: u32 = 3;
+/// No more rays than this of a packet there are tested one by one, against its triangles brought together.
+const FEW_IN_PACKET: u32 = 2;
+
+impl<'a, T: Simd> Bundle<'a, T> {
+    /// Tests the leaf's triangles for some of the rays.
+    #[inline(always)]
+    pub(super) fn test_leaf<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: impl Gather,
+        primitives: &[u32],
+        rays: u64,
+    ) {
+        if rays.count_ones() <= FEW_AT_LEAF {
+            let (mut new, mut left) = (0, rays);
+            while let Some(index) = first_packet(&mut left) {
+                let asked = self.asked(index, rays);
+                let packet = self.packet(index);
+                let of_packet = packet.test_by_ray::<Q>(token, leaf, primitives, asked);
+                new |= u64::from(of_packet) << (LANES * index);
+            }
+            return self.note::<Q>(token, new);
+        }
+        if !Q::CLOSEST && packets_of(rays) > rays.count_ones().div_ceil(LANES as u32) {
+            return self.test_leaf_brought_together::<Q>(token, leaf, primitives, rays);
+        }
+        let (mut from, mut room) = (0, MaybeUninit::uninit());
+        while from < leaf.count() {
+            let triangles = leaf.gather(from, &mut room);
+            from += triangles.count();
+            let (mut new, mut left) = (0, rays);
+            while let Some(index) = first_packet(&mut left) {
+                let asked = self.asked(index, rays);
+                let packet = self.packet(index);
+                let of_packet = if asked.lanes.count_ones() <= FEW_IN_PACKET {
+                    packet.test_by_ray::<Q>(token, triangles, primitives, asked)
+                } else {
+                    packet.test_leaf::<Q, _>(token, triangles, primitives, asked)
+                };
+                new |= u64::from(of_packet) << (LANES * index);
+            }
+            self.note::<Q>(token, new);
+        }
+    }
+
+    /// The same for rays that are spread over more packets than they would fill: eight at a time, whatever packets they are of.
+    /// Whether there is a hit is all that is found out.
+    #[inline(always)]
+    fn test_leaf_brought_together<Q: Query>(
+        &mut self,
+        token: T,
+        leaf: impl Gather,
+        primitives: &[u32],
+        rays: u64,
+    ) {
+        let (mut from, mut room) = (0, MaybeUninit::uninit());
+        while from < leaf.count() {
+            let triangles = leaf.gather(from, &mut room);
+            from += triangles.count();
+            let (mut new, mut left) = (0, rays & self.looking);
+            while left != 0 {
+                let (mut numbers, mut group) = ([0; LANES], [PreparedRay::ROOM; LANES]);
+                let mut count = 0;
+                for (number, ray) in numbers.iter_mut().zip(&mut group) {
+                    if left == 0 {
+                        break;
+                    }
+                    *number = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    *ray = *self.rays.get(*number).unwrap_or(&PreparedRay::ROOM);
+                    count += 1;
+                }
+                let asked = Asked {
+                    lanes: u32::MAX >> (32 - count),
+                    found: 0,
+                    rays: &group,
+                    axes: self.axes,
+                };
+                let mut shears = Shears::of(token, &group, *self.axes);
+                for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
+                    new |= 1 << numbers[lane % LANES];
+                }
+            }
+            self.note::<Q>(token, new);
+        }
+    }
+
+    /// What a packet is asked of some of the rays.
+    #[inline(always)]
+    fn asked(&self, index: usize, rays: u64) -> Asked<'a> {
+        let first = LANES * index;
+        Asked {
+            lanes: u32::from((rays >> first) as u8),
+            found: u32::from((self.found >> first) as u8),
+            rays: &self.rays[first..],
+            axes: self.axes,
+        }
+    }
+
+    /// Takes note of rays that have a new best hit, and how far the others still look.
+    #[inline(always)]
+    fn note<Q: Query>(&mut self, token: T, new: u64) {
+        self.found |= new;
+        if !Q::CLOSEST {
+            self.looking &= !new;
+        } else if new != 0 {
+            let mut far = V::<T>::splat(token, f32::NEG_INFINITY);
+            for index in 0..self.count {
+                far = far.max(self.packet(index).far);
+            }
+            self.far = most(far);
+        }
+    }
+}
+
+/// How many packets have any of the rays.
+#[inline(always)]
+fn packets_of(rays: u64) -> u32 {
+    const { assert!(LANES == 8) };
+    // Each packet's bits brought down to its lowest.
+    let pairs = rays | rays >> 4;
+    let ones = pairs | pairs >> 2;
+    ((ones | ones >> 1) & 0x0101_0101_0101_0101).count_ones()
+}
