@@ -5,12 +5,13 @@
 
 use super::{
     bundle::{self, Outcome, Tightness},
+    eight::Eight,
     query::Query,
 };
 use crate::{
     geometry::Ray,
     layout::{Bvh, Storage, TriangleLeaves, WideNode},
-    simd::{Lanes, Simd, Vector, load_all},
+    simd::{Lanes, Simd, Vector},
     slab::PreparedRay,
 };
 
@@ -149,11 +150,9 @@ impl Classes {
     fn new<T: Simd>(token: T, rays: &[Ray]) -> Self {
         let mut bits = [0; 5];
         for (index, rays) in rays.chunks(8).enumerate() {
-            let mut rows = [[0.0; 8]; 8];
-            for (row, ray) in rows.iter_mut().zip(rays) {
-                *row = bytemuck::cast(*ray);
-            }
-            let [_, _, _, x, y, z, ..] = token.transpose(load_all(token, &rows));
+            let mut eight = [PreparedRay::ROOM; 8];
+            eight[..rays.len()].copy_from_slice(rays);
+            let [x, y, z] = Eight::new(token, &eight).direction;
             let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
             let largest = [ay.le(ax) & az.le(ax), ax.lt(ay) & az.le(ay)];
             let of_eight = [

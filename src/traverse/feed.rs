@@ -3,13 +3,13 @@
 //! Rays are made ready eight at a time, a ray a lane of vectors, which is much less work than one by one. Those that are
 //! out of the ordinary, because they hit nothing, have to be scaled or are too far away, are answered at once.
 
-use super::{query::Query, triangles::Found};
+use super::{eight::Eight, query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
     layout::{Bvh, Storage, TriangleLeaves, WideNode},
     primitive::triangle::bits,
-    simd::{Operation, Simd, load_all},
-    slab::NarrowRay,
+    simd::{Operation, Simd},
+    slab::{NarrowRay, PreparedRay},
 };
 use bytemuck::Zeroable;
 
@@ -114,20 +114,23 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
     fn run<T: Simd>(self, token: T) {
         let Self(feed) = self;
         while feed.to_start == 0 {
-            let (mut rows, mut count) = ([[0.0; 8]; READY], 0);
+            let (mut rays, mut count) = ([PreparedRay::ROOM; READY], 0);
             while count < READY
                 && let Some(index) = feed.next_index()
             {
-                rows[count] = bytemuck::cast(feed.rays[index]);
+                rays[count] = feed.rays[index];
                 feed.indices[count] = index;
                 count += 1;
             }
             if count == 0 {
                 return;
             }
-            let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(load_all(token, &rows));
-            let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
-            let (bounds, range) = (feed.bvh.bounds(), [t_min, t_max]);
+            let Eight {
+                origin,
+                direction,
+                range,
+            } = Eight::new(token, &rays);
+            let bounds = feed.bvh.bounds();
             let ordinary;
             (feed.ready, ordinary) =
                 NarrowRay::eight(token, origin, direction, range, bounds, N::WIDTH);

@@ -24,6 +24,7 @@ mod boxes;
 mod bundle;
 mod classes;
 mod count;
+mod eight;
 mod feed;
 mod guess;
 mod one_by_one;

@@ -100,7 +100,7 @@ pub(super) fn walk_boxes<
                 // Read when it is known which, too late to wait for a line that the boxes were not in.
                 N::prefetch_links(token, ptr::from_ref(node).cast());
             }
-            let (mut mask, near) = boxes.test(node, t_max);
+            let (mask, near) = boxes.test(node, t_max);
             if mask == 0 {
                 match pop::<L, V>(&stack, &mut len, t_max) {
                     Some(link) => current = link,
@@ -108,16 +108,16 @@ pub(super) fn walk_boxes<
                 }
                 continue;
             }
+            let mut others = mask & (mask - 1);
             // Of several the nearest is found by numbers, which takes less than guesses that are wrong.
-            let first = if mask & (mask - 1) == 0 || !V::NEAREST_FIRST {
+            let first = if others == 0 || !V::NEAREST_FIRST {
                 guessed_lowest(mask)
             } else {
                 mask.trailing_zeros() as usize
             };
-            mask &= mask - 1;
             // SAFETY: `mask` has bits for the node's lanes alone.
             current = unsafe { node.link(first) };
-            if mask == 0 {
+            if others == 0 {
                 continue;
             }
             let near = B::nears(near);
@@ -133,8 +133,8 @@ pub(super) fn walk_boxes<
             let mut nearest = entry(first);
             let base = len;
             loop {
-                let other = entry(mask.trailing_zeros() as usize);
-                mask &= mask - 1;
+                let other = entry(others.trailing_zeros() as usize);
+                others &= others - 1;
                 let farther = if V::NEAREST_FIRST {
                     let farther = nearest.max(other);
                     nearest = nearest.min(other);
@@ -149,7 +149,7 @@ pub(super) fn walk_boxes<
                 // children behind.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
                 len += 1;
-                if mask == 0 {
+                if others == 0 {
                     break;
                 }
             }

@@ -6,7 +6,7 @@ use super::{
     shears::{Asked, Shears, V},
 };
 use crate::{
-    layout::{Gather, Triangles},
+    layout::{Gather, Gathered, Triangles},
     primitive::triangle::bits,
     simd::{Lanes, Simd, Vector},
     slab::{PreparedRay, most},
@@ -39,68 +39,79 @@ impl<'a, T: Simd> Bundle<'a, T> {
             }
             return self.note::<Q>(token, new);
         }
-        if !Q::CLOSEST && packets_of(rays) > rays.count_ones().div_ceil(LANES as u32) {
-            return self.test_leaf_brought_together::<Q>(token, leaf, primitives, rays);
-        }
+        let scattered = !Q::CLOSEST && packets_of(rays) > rays.count_ones().div_ceil(LANES as u32);
         let (mut from, mut room) = (0, MaybeUninit::uninit());
         while from < leaf.count() {
             let triangles = leaf.gather(from, &mut room);
             from += triangles.count();
-            let (mut new, mut left) = (0, rays);
-            while let Some(index) = first_packet(&mut left) {
-                let asked = self.asked(index, rays);
-                let packet = self.packet(index);
-                let of_packet = if asked.lanes.count_ones() <= FEW_IN_PACKET {
-                    packet.test_by_ray::<Q>(token, triangles, primitives, asked)
-                } else {
-                    packet.test_leaf::<Q, _>(token, triangles, primitives, asked)
-                };
-                new |= u64::from(of_packet) << (LANES * index);
-            }
+            let rays = rays & self.looking;
+            let new = if scattered {
+                self.test_scattered::<Q>(token, triangles, primitives, rays)
+            } else {
+                self.test_by_packet::<Q>(token, triangles, primitives, rays)
+            };
             self.note::<Q>(token, new);
         }
+    }
+
+    /// Tests triangles that are brought together, for each packet as it is. The rays that have a new best hit.
+    #[inline(always)]
+    fn test_by_packet<Q: Query>(
+        &mut self,
+        token: T,
+        triangles: impl Gathered,
+        primitives: &[u32],
+        rays: u64,
+    ) -> u64 {
+        let (mut new, mut left) = (0, rays);
+        while let Some(index) = first_packet(&mut left) {
+            let asked = self.asked(index, rays);
+            let packet = self.packet(index);
+            let of_packet = if asked.lanes.count_ones() <= FEW_IN_PACKET {
+                packet.test_by_ray::<Q>(token, triangles, primitives, asked)
+            } else {
+                packet.test_leaf::<Q, _>(token, triangles, primitives, asked)
+            };
+            new |= u64::from(of_packet) << (LANES * index);
+        }
+        new
     }
 
     /// The same for rays that are spread over more packets than they would fill: eight at a time, whatever packets they are of.
     /// Whether there is a hit is all that is found out.
     #[inline(always)]
-    fn test_leaf_brought_together<Q: Query>(
-        &mut self,
+    fn test_scattered<Q: Query>(
+        &self,
         token: T,
-        leaf: impl Gather,
+        triangles: impl Gathered,
         primitives: &[u32],
         rays: u64,
-    ) {
-        let (mut from, mut room) = (0, MaybeUninit::uninit());
-        while from < leaf.count() {
-            let triangles = leaf.gather(from, &mut room);
-            from += triangles.count();
-            let (mut new, mut left) = (0, rays & self.looking);
-            while left != 0 {
-                let (mut numbers, mut group) = ([0; LANES], [PreparedRay::ROOM; LANES]);
-                let mut count = 0;
-                for (number, ray) in numbers.iter_mut().zip(&mut group) {
-                    if left == 0 {
-                        break;
-                    }
-                    *number = left.trailing_zeros() as usize;
-                    left &= left - 1;
-                    *ray = *self.rays.get(*number).unwrap_or(&PreparedRay::ROOM);
-                    count += 1;
+    ) -> u64 {
+        let (mut new, mut left) = (0, rays);
+        while left != 0 {
+            let (mut numbers, mut group) = ([0; LANES], [PreparedRay::ROOM; LANES]);
+            let mut count = 0;
+            for (number, ray) in numbers.iter_mut().zip(&mut group) {
+                if left == 0 {
+                    break;
                 }
-                let asked = Asked {
-                    lanes: u32::MAX >> (32 - count),
-                    found: 0,
-                    rays: &group,
-                    axes: self.axes,
-                };
-                let mut shears = Shears::of(token, &group, *self.axes);
-                for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
-                    new |= 1 << numbers[lane % LANES];
-                }
+                *number = left.trailing_zeros() as usize;
+                left &= left - 1;
+                *ray = *self.rays.get(*number).unwrap_or(&PreparedRay::ROOM);
+                count += 1;
             }
-            self.note::<Q>(token, new);
+            let asked = Asked {
+                lanes: u32::MAX >> (32 - count),
+                found: 0,
+                rays: &group,
+                axes: self.axes,
+            };
+            let mut shears = Shears::of(token, &group, *self.axes);
+            for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
+                new |= 1 << numbers[lane % LANES];
+            }
         }
+        new
     }
 
     /// What a packet is asked of some of the rays.

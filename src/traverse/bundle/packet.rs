@@ -8,9 +8,9 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::{Gathered, Triangles},
     primitive::triangle::{RayShear, bits},
-    simd::{Lanes, Simd, Vector, load_all},
+    simd::{Lanes, Simd, Vector},
     slab::{PreparedRay, RaySlabs, reach, reciprocals},
-    traverse::{query::Query, triangles::Found},
+    traverse::{eight::Eight, query::Query, triangles::Found},
 };
 
 /// Eight rays.
@@ -31,19 +31,21 @@ impl<T: Simd> Packet<T> {
         rays: &[Ray],
         like: &PreparedRay,
     ) -> Option<(Self, V<T>, V<T>)> {
-        let mut padded = [[0.0; 8]; LANES];
-        let rows: &[[f32; 8]; LANES] = match rays.first_chunk::<LANES>() {
-            Some(rays) => bytemuck::cast_ref(rays),
+        let padded: [Ray; LANES];
+        let eight = match rays.first_chunk() {
+            Some(eight) => eight,
             None => {
-                for (lane, row) in padded.iter_mut().enumerate() {
-                    *row = bytemuck::cast(*rays.get(lane).unwrap_or(like.ray));
-                }
+                padded = core::array::from_fn(|lane| *rays.get(lane).unwrap_or(like.ray));
                 &padded
             }
         };
-        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(load_all(token, rows));
-        let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
-        if !like.is_like(token, origin, direction, [t_min, t_max]) {
+        let Eight {
+            origin,
+            direction,
+            range,
+        } = Eight::new(token, eight);
+        let [t_min, t_max] = range;
+        if !like.is_like(token, origin, direction, range) {
             return None;
         }
         let reciprocals = reciprocals(token, direction);
@@ -51,7 +53,6 @@ impl<T: Simd> Packet<T> {
         let (mut slabs, extent) =
             RaySlabs::of_lanes(token, origin, reciprocals, t_min, signs, bounds);
         let start = slabs.begin_at_zero(token, t_min);
-        let range = [t_min, t_max];
         let along = reciprocals[like.axes[2]];
         let packet = Self {
             slabs,

@@ -8,9 +8,9 @@ use crate::{
         exact::{Pair, Pairs},
         triangle::{Along, Edges, Sheared, bits},
     },
-    simd::{Lanes, Simd, Vector, load_all, splat3},
+    simd::{Lanes, Simd, Vector, splat3},
     slab::{PreparedRay, reciprocal},
-    traverse::query::Query,
+    traverse::{eight::Eight, query::Query},
 };
 
 /// A number of each ray of a packet.
@@ -68,11 +68,13 @@ impl<T: Simd> Shears<T> {
     /// The same of prepared rays, each as its caller gave it.
     #[inline(always)]
     pub(super) fn of(token: T, rays: &[Ray; LANES], axes: [usize; 3]) -> Self {
-        let rows: &[[f32; 8]; LANES] = bytemuck::cast_ref(rays);
-        let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(load_all(token, rows));
-        let direction = [dx, dy, dz];
+        let Eight {
+            origin,
+            direction,
+            range,
+        } = Eight::new(token, rays);
         let along = reciprocal(token, direction[axes[2]]);
-        Self::new(token, [ox, oy, oz], direction, [t_min, t_max], along, axes)
+        Self::new(token, origin, direction, range, along, axes)
     }
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
