@@ -1,5 +1,6 @@
 //! A mesh in the order in which rays read it.
 
+use super::pages;
 use crate::{
     geometry::TriangleMesh,
     layout::{Bvh, MeshTooSmall, Owned, RunLeaf, WideNode},
@@ -52,12 +53,16 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
         let used = triangles.all.iter().flat_map(corners);
         let vertices = Order::of_first_use(mesh.positions().len(), used);
         let position = |&vertex: &u32| mesh.positions()[vertex as usize];
-        let indices = triangles.all.iter().map(corners);
+        let place = |vertex: u32| vertices.places[vertex as usize];
+        let (mut positions, mut indices) = (
+            pages::with_capacity(vertices.all.len()),
+            pages::with_capacity(mesh.len()),
+        );
+        positions.extend(vertices.all.iter().map(position));
+        indices.extend(triangles.all.iter().map(corners).map(|all| all.map(place)));
         Ok(ReorderedMesh {
-            positions: vertices.all.iter().map(position).collect(),
-            indices: indices
-                .map(|corners| corners.map(|vertex| vertices.places[vertex as usize]))
-                .collect(),
+            positions,
+            indices,
             vertices: vertices.all,
             triangles: triangles.all,
         })
