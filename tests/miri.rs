@@ -211,8 +211,10 @@ fn packets() {
 fn through_bytes<T: bytemuck::Pod>(items: &[T]) -> Vec<T> {
     let bytes: &[u8] = bytemuck::cast_slice(items);
     let shifted = [&[0], bytes].concat();
-    let items = shifted[1..].chunks_exact(size_of::<T>());
-    items.map(bytemuck::pod_read_unaligned).collect()
+    let item = |at: usize| &shifted[1 + at * size_of::<T>()..][..size_of::<T>()];
+    (0..items.len())
+        .map(|at| bytemuck::pod_read_unaligned(item(at)))
+        .collect()
 }
 
 #[test]

@@ -145,6 +145,11 @@ fn edit(bytes: &mut Vec<u8>, edit: &Edit) {
             .get_mut(usize::from(at) % words * 4..)?
             .first_chunk_mut()
     }
+    fn change(bytes: &mut [u8], at: u16, change: impl Fn(u32) -> u32) {
+        if let Some(word) = word(bytes, at) {
+            *word = change(u32::from_ne_bytes(*word)).to_ne_bytes();
+        }
+    }
     let len = bytes.len();
     let place = |at: u16| usize::from(at) % len.max(1);
     match *edit {
@@ -153,27 +158,18 @@ fn edit(bytes: &mut Vec<u8>, edit: &Edit) {
                 *byte ^= bits;
             }
         }
-        Edit::Word(at, value) => {
-            word(bytes, at).map(|word| *word = value.to_ne_bytes());
-        }
-        Edit::Float(at, Float(value)) => {
-            word(bytes, at).map(|word| *word = value.to_ne_bytes());
-        }
-        Edit::Field(field, value) => {
-            word(bytes, u16::from(field % 32)).map(|word| *word = value.to_ne_bytes());
-        }
+        Edit::Word(at, value) => change(bytes, at, |_| value),
+        Edit::Float(at, Float(value)) => change(bytes, at, |_| value.to_bits()),
+        Edit::Field(field, value) => change(bytes, u16::from(field % 32), |_| value),
         Edit::Count(count, by) => {
             let at = COUNTS as u16 / 4 + u16::from(count % 5);
-            word(bytes, at).map(|word| {
-                let value = u32::from_ne_bytes(*word).wrapping_add_signed(by.into());
-                *word = value.to_ne_bytes();
-            });
+            change(bytes, at, |word| word.wrapping_add_signed(by.into()));
         }
         Edit::Copy(from, to, count) => {
             for i in 0..u16::from(count) {
-                let value = word(bytes, from.wrapping_add(i)).copied();
-                let to = word(bytes, to.wrapping_add(i));
-                to.zip(value).map(|(to, value)| *to = value);
+                if let Some(&mut value) = word(bytes, from.wrapping_add(i)) {
+                    change(bytes, to.wrapping_add(i), |_| u32::from_ne_bytes(value));
+                }
             }
         }
         Edit::Remove(at, count) => {

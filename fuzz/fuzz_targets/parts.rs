@@ -109,7 +109,9 @@ impl Bytes {
                     let Some(value) = word(part, from.wrapping_add(i)).copied() else {
                         return;
                     };
-                    word(part, to.wrapping_add(i)).map(|word| *word = value);
+                    if let Some(word) = word(part, to.wrapping_add(i)) {
+                        *word = value;
+                    }
                 }
             }
             Edit::Add(part, at, count, by) => {

@@ -213,8 +213,8 @@ impl Operation for Search<'_> {
         let area_bits = S::F32x8::splat(token, f32::from_bits(!SLOT));
         let slot_bits = S::F32x8::splat(token, f32::from_bits(SLOT));
         let one = S::F32x8::splat(token, 1.0);
-        let chunks = self.slots.chunks_exact_mut(LANES);
-        for (slots, first) in chunks.zip((0..).step_by(LANES)) {
+        let (chunks, _) = self.slots.as_chunks_mut::<LANES>();
+        for (slots, first) in chunks.iter_mut().zip((0..).step_by(LANES)) {
             let boxes = [
                 around(a, first),
                 around(b, first),
@@ -234,7 +234,7 @@ impl Operation for Search<'_> {
                 let slot = S::F32x8::splat(token, f32::from_bits(slot as u32));
                 least = ((area & area_bits) | slot).min_from_zero(least);
             }
-            slots.copy_from_slice(&((least & slot_bits) | one).to_array());
+            *slots = ((least & slot_bits) | one).to_array();
         }
     }
 }

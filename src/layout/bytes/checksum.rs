@@ -39,17 +39,16 @@ fn sum(bytes: &[u8]) -> u32 {
     let (before, after) = bytes.split_at(FIELD.min(bytes.len()));
     let after = after.get(4..).unwrap_or(&[]);
     for block in before.chunks(4 * LANES).chain(after.chunks(4 * LANES)) {
-        for (lane, word) in lanes.iter_mut().zip(block.chunks_exact(4)) {
-            *lane = step(*lane, word);
+        for (lane, word) in lanes.iter_mut().zip(block.as_chunks().0) {
+            *lane = step(*lane, *word);
         }
     }
     lanes
         .into_iter()
-        .fold(0x811c_9dc5, |sum, lane| step(sum, &u32::to_ne_bytes(lane)))
+        .fold(0x811c_9dc5, |sum, lane| step(sum, lane.to_ne_bytes()))
 }
 
 #[inline(always)]
-fn step(sum: u32, word: &[u8]) -> u32 {
-    let word = u32::from_ne_bytes(*word.first_chunk().unwrap_or(&[0; 4]));
-    (sum ^ word).wrapping_mul(0x0100_0193)
+fn step(sum: u32, word: [u8; 4]) -> u32 {
+    (sum ^ u32::from_ne_bytes(word)).wrapping_mul(0x0100_0193)
 }

@@ -416,10 +416,8 @@ fn ask_at_once<N: WideNode, L: TriangleLeaves, S: Storage>(
     let call = ["closest_hits_in", "any_hits_in"];
     compare(call, 0, &hits[..some], &occluded[..some])?;
     // The same bundles as in batches, of fewer rays: some will do.
-    for (packet, rays) in rays.chunks_exact(8).enumerate().step_by(8) {
-        let Some(rays) = rays.first_chunk::<8>() else {
-            continue;
-        };
+    let (packets, _) = rays.as_chunks::<8>();
+    for (packet, rays) in packets.iter().enumerate().step_by(8) {
         let (hits, any) = (
             bvh.closest_hit_packet(rays, 0xff),
             bvh.any_hit_packet(rays, 0xff),
