@@ -96,26 +96,29 @@ pub(super) fn exact_hit(pair: &Pair, corners: [[f32; 3]; 3], open: Open) -> Opti
 /// ray from 0 along z not at all.
 #[inline(never)]
 fn solve(pair: &Pair, along: f32, least: f64) -> Option<[f32; 3]> {
-    let (a, b, c) = (pair.shear(0), pair.shear(1), pair.shear(2));
-    let mut largest = 0;
-    let wa = edge(&c, &b, &mut largest);
-    let wb = edge(&a, &c, &mut largest);
-    let wc = edge(&b, &a, &mut largest);
-    let area = wa + wb + wc;
+    let corners = [pair.shear(0), pair.shear(1), pair.shear(2)];
+    let (mut area, mut z, mut largest) = (0.0, 0.0, 0);
+    // A loop, and of nothing that is cleared first: where `f64` is emulated each turn is a hundred bytes of calls.
+    let weights: [f64; 3] = core::array::from_fn(|corner| {
+        let (p, q) = (&corners[(corner + 2) % 3], &corners[(corner + 1) % 3]);
+        let weight = edge(p, q, &mut largest);
+        area += weight;
+        z += weight * corners[corner][2];
+        weight
+    });
     let size = magnitude(area);
-    let against = |weight: f64| {
-        magnitude(weight) != 0 && weight.is_sign_negative() != area.is_sign_negative()
+    let against = |weight: &f64| {
+        // Not by its magnitude: of that compilers make a comparison of numbers again.
+        weight.to_bits() << 1 != 0 && weight.is_sign_negative() != area.is_sign_negative()
     };
-    if against(wa)
-        || against(wb)
-        || against(wc)
+    if weights.iter().any(against)
         || size == 0
         || size < magnitude(f64::from_bits(largest) * least)
         || size >= magnitude(f64::INFINITY)
     {
         return None;
     }
-    let z = wa * a[2] + wb * b[2] + wc * c[2];
+    let [_, wb, wc] = weights;
     let along = f64::from(along);
     let scale = reciprocal64(area * along);
     let t = (z * scale) as f32 + 0.0;
