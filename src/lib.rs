@@ -37,6 +37,12 @@
 //! - `alloc`: hierarchies that own their memory. Without it they are borrowed slices.
 //! - `rayon`: builds on all cores, and batches if asked to. Tree and answers are the same, bit for bit.
 
+#[cfg(all(target_arch = "x86", not(target_feature = "sse2")))]
+compile_error!(
+    "answers are exact where each operation on floats rounds once: x87 rounds twice, so 32-bit x86 needs SSE2, \
+    which i686 has"
+);
+
 #[cfg(feature = "alloc")]
 extern crate alloc;
 #[cfg(feature = "std")]
