@@ -96,29 +96,26 @@ pub(super) fn exact_hit(pair: &Pair, corners: [[f32; 3]; 3], open: Open) -> Opti
 /// ray from 0 along z not at all.
 #[inline(never)]
 fn solve(pair: &Pair, along: f32, least: f64) -> Option<[f32; 3]> {
-    let corners = [pair.shear(0), pair.shear(1), pair.shear(2)];
-    let (mut area, mut z, mut largest) = (0.0, 0.0, 0);
-    // A loop, and of nothing that is cleared first: where `f64` is emulated each turn is a hundred bytes of calls.
-    let weights: [f64; 3] = core::array::from_fn(|corner| {
-        let (p, q) = (&corners[(corner + 2) % 3], &corners[(corner + 1) % 3]);
-        let weight = edge(p, q, &mut largest);
-        area += weight;
-        z += weight * corners[corner][2];
-        weight
-    });
+    let (a, b, c) = (pair.shear(0), pair.shear(1), pair.shear(2));
+    let mut largest = 0;
+    let wa = edge(&c, &b, &mut largest);
+    let wb = edge(&a, &c, &mut largest);
+    let wc = edge(&b, &a, &mut largest);
+    let area = wa + wb + wc;
     let size = magnitude(area);
-    let against = |weight: &f64| {
-        // Not by its magnitude: of that compilers make a comparison of numbers again.
-        weight.to_bits() << 1 != 0 && weight.is_sign_negative() != area.is_sign_negative()
-    };
-    if weights.iter().any(against)
+    // Whether it is not 0 and of the other sign.
+    let sign = area.to_bits() & SIGN;
+    let against = |weight: f64| weight.to_bits() ^ sign > SIGN;
+    if against(wa)
+        || against(wb)
+        || against(wc)
         || size == 0
         || size < magnitude(f64::from_bits(largest) * least)
         || size >= magnitude(f64::INFINITY)
     {
         return None;
     }
-    let [_, wb, wc] = weights;
+    let z = wa * a[2] + wb * b[2] + wc * c[2];
     let along = f64::from(along);
     let scale = reciprocal64(area * along);
     let t = (z * scale) as f32 + 0.0;
@@ -134,9 +131,11 @@ fn edge(p: &[f64; 3], q: &[f64; 3], largest: &mut u64) -> f64 {
     more - less
 }
 
+const SIGN: u64 = 1 << 63;
+
 /// Numbers are compared by their bits: where `f64` is emulated, comparisons are calls.
 fn magnitude(number: f64) -> u64 {
-    number.to_bits() & (u64::MAX >> 1)
+    number.to_bits() & !SIGN
 }
 
 /// 1 / `number`, which is normal and has a normal inverse, to 2^-51: by Newton's method. Where `f64` is emulated, its
