@@ -16,8 +16,8 @@ use wide_bvh::{
     },
 };
 use wide_bvh_fuzz::{
-    BoxBytes, Float, Mesh, MeshBytes, Opened, RayBytes, Width, assert_all, boxes, corners, floats,
-    of_mesh, open, rays,
+    BoxBytes, Float, Mesh, MeshBytes, Opened, RayBytes, Width, assert_all, boxes, change, copy,
+    corners, floats, of_mesh, open, rays,
 };
 
 #[derive(Arbitrary, Debug)]
@@ -138,18 +138,6 @@ fn full<N: Width>(builder: &Builder, input: &Input, mesh: &Mesh, leaves: u8) -> 
 }
 
 fn edit(bytes: &mut Vec<u8>, edit: &Edit) {
-    /// A word's bytes, its number being taken round.
-    fn word(bytes: &mut [u8], at: u16) -> Option<&mut [u8; 4]> {
-        let words = (bytes.len() / 4).max(1);
-        bytes
-            .get_mut(usize::from(at) % words * 4..)?
-            .first_chunk_mut()
-    }
-    fn change(bytes: &mut [u8], at: u16, change: impl Fn(u32) -> u32) {
-        if let Some(word) = word(bytes, at) {
-            *word = change(u32::from_ne_bytes(*word)).to_ne_bytes();
-        }
-    }
     let len = bytes.len();
     let place = |at: u16| usize::from(at) % len.max(1);
     match *edit {
@@ -165,13 +153,7 @@ fn edit(bytes: &mut Vec<u8>, edit: &Edit) {
             let at = COUNTS as u16 / 4 + u16::from(count % 5);
             change(bytes, at, |word| word.wrapping_add_signed(by.into()));
         }
-        Edit::Copy(from, to, count) => {
-            for i in 0..u16::from(count) {
-                if let Some(&mut value) = word(bytes, from.wrapping_add(i)) {
-                    change(bytes, to.wrapping_add(i), |_| u32::from_ne_bytes(value));
-                }
-            }
-        }
+        Edit::Copy(from, to, count) => copy(bytes, from, to, count),
         Edit::Remove(at, count) => {
             let at = place(at);
             bytes.drain(at..(at + usize::from(count)).min(len));

@@ -22,7 +22,7 @@ use wide_bvh::{
 };
 use wide_bvh_fuzz::{
     Answers, BoxBytes, Float, Found, Mesh, MeshBytes, Move, RayBytes, Width, assert_all, boxes,
-    corners, moved, of_boxes, of_mesh, rays,
+    change, copy, corners, moved, of_boxes, of_mesh, rays,
 };
 
 #[derive(Arbitrary, Debug)]
@@ -79,12 +79,6 @@ impl Bytes {
 
     fn edit(&mut self, edit: &Edit) {
         let Self(parts) = self;
-        /// A word's bytes, its number being taken round.
-        fn word(part: &mut [u8], at: u16) -> Option<&mut [u8; 4]> {
-            let words = (part.len() / 4).max(1);
-            part.get_mut(usize::from(at) % words * 4..)?
-                .first_chunk_mut()
-        }
         match *edit {
             Edit::Flip(part, at, bits) => {
                 let part = &mut parts[part as usize];
@@ -93,33 +87,16 @@ impl Bytes {
                     *byte ^= bits;
                 }
             }
-            Edit::Word(part, at, value) => {
-                if let Some(word) = word(&mut parts[part as usize], at) {
-                    *word = value.to_le_bytes();
-                }
-            }
+            Edit::Word(part, at, value) => change(&mut parts[part as usize], at, |_| value),
             Edit::Float(part, at, Float(value)) => {
-                if let Some(word) = word(&mut parts[part as usize], at) {
-                    *word = value.to_le_bytes();
-                }
+                change(&mut parts[part as usize], at, |_| value.to_bits());
             }
-            Edit::Copy(part, from, to, count) => {
-                let part = &mut parts[part as usize];
-                for i in 0..u16::from(count) {
-                    let Some(value) = word(part, from.wrapping_add(i)).copied() else {
-                        return;
-                    };
-                    if let Some(word) = word(part, to.wrapping_add(i)) {
-                        *word = value;
-                    }
-                }
-            }
+            Edit::Copy(part, from, to, count) => copy(&mut parts[part as usize], from, to, count),
             Edit::Add(part, at, count, by) => {
                 for i in 0..u16::from(count) {
-                    if let Some(word) = word(&mut parts[part as usize], at.wrapping_add(i)) {
-                        let value = u32::from_le_bytes(*word).wrapping_add_signed(by.into());
-                        *word = value.to_le_bytes();
-                    }
+                    change(&mut parts[part as usize], at.wrapping_add(i), |word| {
+                        word.wrapping_add_signed(by.into())
+                    });
                 }
             }
             Edit::Cut(part, bytes) => {

@@ -4,6 +4,7 @@
 //! - `float`, `mesh`, `boxes`, `rays`, `settings`: the inputs.
 //! - `width`: builds and queries, for nodes of each width; `ask`: every query there is, on every backend; `compact`: both, of leaves
 //!   that read a mesh.
+//! - `words`: bytes spoilt.
 //! - `truth`: what the reference says.
 
 mod ask;
@@ -16,6 +17,7 @@ mod rays;
 mod settings;
 mod truth;
 mod width;
+mod words;
 
 pub use ask::{Answers, Found, found};
 pub use boxes::{BoxBytes, Liar, boxes, corners};
@@ -27,3 +29,4 @@ pub use rays::{RayBytes, rays};
 pub use settings::{Cancel, Settings};
 pub use truth::{assert_all, first_not_finite, of_boxes, of_mesh};
 pub use width::{Boxes, Triangles, Width};
+pub use words::{change, copy};

@@ -41,8 +41,7 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
                 .chain(children.filter(is_leaf)),
         )
     };
-    let mut nodes = pages::with_capacity::<C>(full.nodes().len());
-    nodes.extend(full.nodes().iter().map(node));
+    let nodes: Vec<C> = pages::collected(full.nodes().iter().map(node));
     let bounds = tested_bounds(&nodes, *full.bounds());
     let count = primitives.len();
     let compact = Bvh::from_parts(nodes, (), primitives, bounds).map_err(|error| match error {

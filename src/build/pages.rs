@@ -13,6 +13,13 @@ pub(super) fn with_capacity<T>(capacity: usize) -> Vec<T> {
     vector
 }
 
+/// The items as a vector, on large pages if the system has them.
+pub(super) fn collected<T>(items: impl ExactSizeIterator<Item = T>) -> Vec<T> {
+    let mut vector = with_capacity(items.len());
+    vector.extend(items);
+    vector
+}
+
 /// A vector of so many times `value`, on large pages if the system has them.
 ///
 /// With `rayon` all threads write it: for the system, too, new memory is work.

@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 53 to 81 | 0.78 |
-/// | [`Balanced`](Self::Balanced) | 270 to 410 | 0.96 |
-/// | [`Best`](Self::Best) | 670 to 1,300 | 1 |
+/// | [`Fast`](Self::Fast) | 52 to 77 | 0.78 |
+/// | [`Balanced`](Self::Balanced) | 260 to 460 | 0.97 |
+/// | [`Best`](Self::Best) | 640 to 1,560 | 1 |
 ///
 /// An EPYC of the first Zen generation takes some twice as long. What moves without changing can be
 /// [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.

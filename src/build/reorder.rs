@@ -55,15 +55,10 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
         let vertices = Order::of_first_use(mesh.positions().len(), used);
         let position = |&vertex: &u32| mesh.positions()[vertex as usize];
         let place = |vertex: u32| vertices.places[vertex as usize];
-        let (mut positions, mut indices) = (
-            pages::with_capacity(vertices.all.len()),
-            pages::with_capacity(mesh.len()),
-        );
-        positions.extend(vertices.all.iter().map(position));
-        indices.extend(triangles.all.iter().map(corners).map(|all| all.map(place)));
+        let indices = triangles.all.iter().map(corners);
         Ok(ReorderedMesh {
-            positions,
-            indices,
+            positions: pages::collected(vertices.all.iter().map(position)),
+            indices: pages::collected(indices.map(|corners| corners.map(place))),
             vertices: vertices.all,
             triangles: triangles.all,
         })
