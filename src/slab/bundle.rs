@@ -14,6 +14,7 @@
 
 use super::{FirstPlanes, UNIT_ROUNDOFF};
 use crate::simd::{Lanes, Vector, splat3};
+use core::array;
 use glam::Vec3;
 
 /// Margin of the test of a bundle: derived above.
@@ -145,19 +146,29 @@ fn most3<const N: usize, V: Vector<N>>([x, y, z]: [V; 3]) -> [f32; 3] {
 /// The least lane.
 #[inline(always)]
 pub(crate) fn least<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
-    let mut least = f32::INFINITY;
-    for number in numbers.to_array() {
-        least = if number < least { number } else { least };
+    let mut least = numbers;
+    let mut step = N / 2;
+    while step > 0 {
+        least = least.min(least.permute(&across(step)));
+        step /= 2;
     }
-    least
+    least.to_array()[0]
 }
 
 /// The greatest lane.
 #[inline(always)]
 pub(crate) fn most<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
-    let mut most = f32::NEG_INFINITY;
-    for number in numbers.to_array() {
-        most = if number > most { number } else { most };
+    let mut most = numbers;
+    let mut step = N / 2;
+    while step > 0 {
+        most = most.max(most.permute(&across(step)));
+        step /= 2;
     }
-    most
+    most.to_array()[0]
+}
+
+/// For each lane the one that is so many away, a power of two.
+#[inline(always)]
+fn across<const N: usize>(step: usize) -> [u8; N] {
+    array::from_fn(|lane| (lane ^ step) as u8)
 }

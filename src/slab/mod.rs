@@ -95,7 +95,7 @@ pub use bundle::BundleSlabs;
 pub(crate) use bundle::{Bundling, least, most};
 pub use narrow::NarrowRay;
 pub use passing::Passing;
-pub(crate) use prepared::{PreparedRay, pow2, reciprocal, reciprocals, unscaled};
+pub(crate) use prepared::{PreparedRay, pow2, reciprocal, reciprocals};
 
 use crate::{
     geometry::{Aabb, Ray},

@@ -114,8 +114,8 @@ impl NarrowRay {
         }
     }
 
-    /// Eight rays, for boxes within `bounds` in nodes of `width` children, and a bit for each that is
-    /// [ordinary](PreparedLanes) and not too far away. The others are of no meaning.
+    /// Writes eight rays, for boxes within `bounds` in nodes of `width` children. A bit for each that is
+    /// [ordinary](PreparedLanes) and not too far away; the others are of no meaning.
     #[inline(always)]
     pub(crate) fn eight<T: Simd>(
         token: T,
@@ -124,7 +124,8 @@ impl NarrowRay {
         range: [T::F32x8; 2],
         bounds: &Aabb,
         width: usize,
-    ) -> ([Self; 8], u32) {
+        rays: &mut [Self; 8],
+    ) -> u32 {
         let prepared = PreparedLanes::new(token, origin, direction, range);
         let PreparedLanes {
             reciprocal,
@@ -151,13 +152,12 @@ impl NarrowRay {
         let ([nx, ny, nz], [fx, fy, fz]) = (slabs.near, slabs.far);
         let starts = token.transpose([rx, ry, rz, nx, ny, nz, fx, fy]);
         let ends = token.transpose([fz, slabs.t_min, slabs.margin, x, y, z, along, axes]);
-        let mut rays = [Self::zeroed(); 8];
         for ((ray, start), end) in rays.iter_mut().zip(starts).zip(ends) {
             let [a, b]: &mut [[f32; 8]; 2] = bytemuck::cast_mut(ray);
             (*a, *b) = (start.to_array(), end.to_array());
         }
         let near = extent.lt(T::F32x8::splat(token, MAX_EXTENT));
-        (rays, (ordinary & near).bits())
+        (ordinary & near).bits()
     }
 
     /// In every lane of vectors, for nodes of the width they were made for.

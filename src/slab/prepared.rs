@@ -145,12 +145,6 @@ impl<'a> PreparedRay<'a> {
         1.0 / numbers[self.axes[2]]
     }
 
-    /// What an accepted `t` is to be multiplied by for [`unscaled`](Self::unscaled).
-    #[inline(always)]
-    pub(crate) fn unscale(&self) -> f32 {
-        self.unscale
-    }
-
     /// The caller's `t` as a scaled one.
     #[inline(always)]
     pub(crate) fn scaled(&self, t: f32) -> f32 {
@@ -161,7 +155,9 @@ impl<'a> PreparedRay<'a> {
     /// scale take it out of what a float can hold.
     #[inline(always)]
     pub(crate) fn unscaled(&self, t: f32, ray: &Ray) -> f32 {
-        unscaled(t, self.unscale, ray)
+        let t = greater(lesser(t * self.unscale, f32::MAX), f32::MIN);
+        // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
+        lesser(greater(t, ray.t_min), ray.t_max) + 0.0
     }
 }
 
@@ -228,14 +224,6 @@ fn ordinary<const N: usize, V: Vector<N>>(
         & (of_origin + of_direction).le(zero)
         & t_min.le(t_max)
         & t_min.lt(V::splat(token, f32::INFINITY))
-}
-
-/// See [`PreparedRay::unscaled`].
-#[inline(always)]
-pub(crate) fn unscaled(t: f32, unscale: f32, ray: &Ray) -> f32 {
-    let t = greater(lesser(t * unscale, f32::MAX), f32::MIN);
-    // Adding 0 turns -0, from underflow or the range's end, into 0: `min` leaves open which it is.
-    lesser(greater(t, ray.t_min), ray.t_max) + 0.0
 }
 
 /// x, y and z of the origin and of the direction. The fourth number of each is of no meaning.

@@ -14,6 +14,7 @@ use crate::{
     simd::{Lanes, Simd, Vector},
     slab::PreparedRay,
 };
+use core::array;
 
 /// Fewer rays than this are no bundle of their own.
 const LEAST: u32 = 8;
@@ -81,14 +82,16 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     let (mut class, mut classes) = (all, None);
     let (mut left, mut waiting) = (all, 0);
     let (mut any_tight, mut any_loose) = (false, false);
-    let mut gathered = [PreparedRay::ROOM; bundle::RAYS];
-    let mut found = [Q::MISS; bundle::RAYS];
+    // Rays of a class and their answers. Cleared when it is needed: mostly all rays are one.
+    let mut room = None;
     loop {
         let count = class.count_ones() as usize;
         let whole = class == all;
         let (part, out) = if whole {
             (rays, &mut *answers)
         } else {
+            let (gathered, found) =
+                room.get_or_insert(([PreparedRay::ROOM; bundle::RAYS], [Q::MISS; bundle::RAYS]));
             for (ray, place) in gathered.iter_mut().zip(places(class)) {
                 *ray = rays[place];
             }
@@ -110,12 +113,13 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             left &= !class;
             any_tight |= tight;
             any_loose |= alike && !tight;
-            if outcome.is_traced() {
-                for (&answer, place) in found.iter().zip(places(class)) {
-                    answers[place] = answer;
+            match &room {
+                Some((_, found)) if outcome.is_traced() => {
+                    for (&answer, place) in found.iter().zip(places(class)) {
+                        answers[place] = answer;
+                    }
                 }
-            } else {
-                waiting |= class;
+                _ => waiting |= class,
             }
         }
         // The next class of some size.
@@ -150,9 +154,8 @@ impl Classes {
     fn new<T: Simd>(token: T, rays: &[Ray]) -> Self {
         let mut bits = [0; 5];
         for (index, rays) in rays.chunks(8).enumerate() {
-            let mut eight = [PreparedRay::ROOM; 8];
-            eight[..rays.len()].copy_from_slice(rays);
-            let [x, y, z] = Eight::new(token, &eight).direction;
+            let eight = array::from_fn(|lane| rays.get(lane).unwrap_or(&PreparedRay::ROOM));
+            let [x, y, z] = Eight::new(token, eight).direction;
             let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
             let largest = [ay.le(ax) & az.le(ax), ax.lt(ay) & az.le(ay)];
             let of_eight = [

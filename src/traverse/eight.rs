@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Simd, load_all},
+    simd::{Simd, Vector},
 };
 
 /// Eight rays, a lane each.
@@ -15,8 +15,17 @@ pub(super) struct Eight<T: Simd> {
 
 impl<T: Simd> Eight<T> {
     #[inline(always)]
-    pub(super) fn new(token: T, rays: &[Ray; 8]) -> Self {
-        let rows = load_all(token, bytemuck::cast_ref(rays));
+    pub(super) fn new(token: T, [a, b, c, d, e, f, g, h]: [&Ray; 8]) -> Self {
+        let rows = [
+            row(token, a),
+            row(token, b),
+            row(token, c),
+            row(token, d),
+            row(token, e),
+            row(token, f),
+            row(token, g),
+            row(token, h),
+        ];
         let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(rows);
         Self {
             origin: [ox, oy, oz],
@@ -24,4 +33,10 @@ impl<T: Simd> Eight<T> {
             range: [t_min, t_max],
         }
     }
+}
+
+/// A ray's eight numbers.
+#[inline(always)]
+fn row<T: Simd>(token: T, ray: &Ray) -> T::F32x8 {
+    T::F32x8::load(token, bytemuck::cast_ref(ray))
 }

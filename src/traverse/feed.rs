@@ -76,10 +76,10 @@ impl<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Feed<'a, N, L, S,
     /// Writes down what a ray has found.
     #[inline(always)]
     pub(super) fn answer(&mut self, index: usize, found: Option<Found>) {
-        if let (Some(ray), Some(answer)) = (self.rays.get(index), self.answers.get_mut(index)) {
+        if let Some(answer) = self.answers.get_mut(index) {
             *answer = match found {
                 None => Q::MISS,
-                Some(found) => Q::answer(found, ray, self.bvh.primitives()),
+                Some(found) => Q::answer(found, self.bvh.primitives()),
             };
         }
     }
@@ -114,11 +114,12 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
     fn run<T: Simd>(self, token: T) {
         let Self(feed) = self;
         while feed.to_start == 0 {
-            let (mut rays, mut count) = ([PreparedRay::ROOM; READY], 0);
+            // Lanes past the last ray hit nothing.
+            let (mut rays, mut count) = ([&PreparedRay::ROOM; READY], 0);
             while count < READY
                 && let Some(index) = feed.next_index()
             {
-                rays[count] = feed.rays[index];
+                rays[count] = &feed.rays[index];
                 feed.indices[count] = index;
                 count += 1;
             }
@@ -129,11 +130,11 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
                 origin,
                 direction,
                 range,
-            } = Eight::new(token, &rays);
+            } = Eight::new(token, rays);
             let bounds = feed.bvh.bounds();
-            let ordinary;
-            (feed.ready, ordinary) =
-                NarrowRay::eight(token, origin, direction, range, bounds, N::WIDTH);
+            let ready = &mut feed.ready;
+            let ordinary =
+                NarrowRay::eight(token, origin, direction, range, bounds, N::WIDTH, ready);
             let all = (1 << count) - 1;
             feed.to_start = all & ordinary;
             for place in bits(all & !ordinary) {

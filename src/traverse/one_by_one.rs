@@ -39,7 +39,7 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
     };
     walk_boxes(Portable, bvh, &mut boxes, prepared.ray.t_max, &mut finder);
     let found = finder.found?;
-    Some(found.hit(ray, prepared.unscale(), bvh.primitives()))
+    Some(found.hit(prepared.unscaled(found.t, ray), bvh.primitives()))
 }
 
 struct Finder<'a> {

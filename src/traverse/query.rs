@@ -20,7 +20,7 @@ pub(super) trait Query {
     ) -> Self::Answer;
 
     /// Of what was found for a ray that was not scaled.
-    fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Self::Answer;
+    fn answer(found: Found, primitives: &[u32]) -> Self::Answer;
 }
 
 /// The closest hit.
@@ -43,8 +43,9 @@ impl Query for ClosestHit {
     }
 
     #[inline(always)]
-    fn answer(found: Found, ray: &Ray, primitives: &[u32]) -> Option<Hit> {
-        Some(found.hit(ray, 1.0, primitives))
+    fn answer(found: Found, primitives: &[u32]) -> Option<Hit> {
+        // `t` is within the ray's range as it is.
+        Some(found.hit(found.t, primitives))
     }
 }
 
@@ -59,7 +60,7 @@ impl Query for AnyHit {
     }
 
     #[inline(always)]
-    fn answer(_: Found, _: &Ray, _: &[u32]) -> bool {
+    fn answer(_: Found, _: &[u32]) -> bool {
         true
     }
 }

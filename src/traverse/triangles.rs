@@ -11,7 +11,7 @@ use crate::{
     layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::{RayShear, TriangleHits, bits},
     simd::{Lanes, Operation, Simd},
-    slab::{NarrowRay, PreparedRay, unscaled},
+    slab::{NarrowRay, PreparedRay},
 };
 use core::{hint::select_unpredictable, ops::ControlFlow};
 
@@ -141,11 +141,11 @@ impl Found {
         closer
     }
 
-    /// In the caller's terms.
+    /// In the caller's terms, of which `t` is.
     #[inline(always)]
-    pub(super) fn hit(self, ray: &Ray, unscale: f32, primitives: &[u32]) -> Hit {
+    pub(super) fn hit(self, t: f32, primitives: &[u32]) -> Hit {
         Hit {
-            t: unscaled(self.t, unscale, ray),
+            t,
             u: self.u,
             v: self.v,
             primitive: primitives[self.place],
@@ -281,7 +281,7 @@ impl<'a, T: Simd> ClosestVisitor<'a, T> {
     #[inline(always)]
     fn hit(&self, ray: &Ray, prepared: &PreparedRay) -> Option<Hit> {
         let found = self.found?;
-        Some(found.hit(ray, prepared.unscale(), self.primitives))
+        Some(found.hit(prepared.unscaled(found.t, ray), self.primitives))
     }
 }
 

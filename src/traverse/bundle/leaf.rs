@@ -12,7 +12,7 @@ use crate::{
     slab::{PreparedRay, most},
     traverse::query::Query,
 };
-use core::mem::MaybeUninit;
+use core::{array, mem::MaybeUninit};
 
 /// No more rays than this at a leaf are tested one by one, against its triangles where they are.
 const FEW_AT_LEAF: u32 = 3;
@@ -89,24 +89,25 @@ impl<'a, T: Simd> Bundle<'a, T> {
     ) -> u64 {
         let (mut new, mut left) = (0, rays);
         while left != 0 {
-            let (mut numbers, mut group) = ([0; LANES], [PreparedRay::ROOM; LANES]);
-            let mut count = 0;
-            for (number, ray) in numbers.iter_mut().zip(&mut group) {
-                if left == 0 {
-                    break;
+            let count = left.count_ones().min(LANES as u32);
+            // Lanes past the last ray repeat it.
+            let (mut numbers, mut number) = ([0; LANES], 0);
+            let group = array::from_fn(|lane| {
+                if left != 0 {
+                    number = left.trailing_zeros() as usize;
+                    left &= left - 1;
                 }
-                *number = left.trailing_zeros() as usize;
-                left &= left - 1;
-                *ray = *self.rays.get(*number).unwrap_or(&PreparedRay::ROOM);
-                count += 1;
-            }
+                numbers[lane % LANES] = number as u8;
+                self.rays.get(number).unwrap_or(&PreparedRay::ROOM)
+            });
             let asked = Asked {
                 lanes: u32::MAX >> (32 - count),
                 found: 0,
-                rays: &group,
+                rays: self.rays,
+                numbers: &numbers,
                 axes: self.axes,
             };
-            let mut shears = Shears::of(token, &group, *self.axes);
+            let mut shears = Shears::of(token, group, *self.axes);
             for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
                 new |= 1 << numbers[lane % LANES];
             }
@@ -122,6 +123,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             lanes: u32::from((rays >> first) as u8),
             found: u32::from((self.found >> first) as u8),
             rays: &self.rays[first..],
+            numbers: &[0, 1, 2, 3, 4, 5, 6, 7],
             axes: self.axes,
         }
     }

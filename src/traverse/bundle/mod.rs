@@ -107,8 +107,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     if !traced {
         return Outcome::GivenUp;
     }
-    let packets = rays.chunks(LANES).zip(answers.chunks_mut(LANES));
-    for (index, (rays, answers)) in packets.enumerate() {
+    for (index, answers) in answers.chunks_mut(LANES).enumerate() {
         let found = bundle.found >> (LANES * index);
         let shears = &bundle.packet(index).shears;
         let (t, u, v) = (
@@ -117,7 +116,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             shears.v.to_array(),
         );
         let places = shears.places.to_array();
-        for (lane, (ray, answer)) in rays.iter().zip(answers).enumerate() {
+        for (lane, answer) in answers.iter_mut().enumerate() {
             let lane = lane % LANES;
             *answer = if found >> lane & 1 == 0 {
                 Q::MISS
@@ -128,7 +127,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
                     v: v[lane],
                     place: places[lane].to_bits() as usize,
                 };
-                Q::answer(found, ray, bvh.primitives())
+                Q::answer(found, bvh.primitives())
             };
         }
     }

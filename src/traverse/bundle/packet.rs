@@ -12,6 +12,7 @@ use crate::{
     slab::{PreparedRay, RaySlabs, reach, reciprocals},
     traverse::{eight::Eight, query::Query, triangles::Found},
 };
+use core::array;
 
 /// Eight rays.
 pub(super) struct Packet<T: Simd> {
@@ -35,7 +36,7 @@ impl<T: Simd> Packet<T> {
         let eight = match rays.first_chunk() {
             Some(eight) => eight,
             None => {
-                padded = core::array::from_fn(|lane| *rays.get(lane).unwrap_or(like.ray));
+                padded = array::from_fn(|lane| *rays.get(lane).unwrap_or(like.ray));
                 &padded
             }
         };
@@ -43,7 +44,7 @@ impl<T: Simd> Packet<T> {
             origin,
             direction,
             range,
-        } = Eight::new(token, eight);
+        } = Eight::new(token, eight.each_ref());
         let [t_min, t_max] = range;
         if !like.is_like(token, origin, direction, range) {
             return None;
@@ -57,7 +58,7 @@ impl<T: Simd> Packet<T> {
         let packet = Self {
             slabs,
             far: reach(token, t_max, slabs.margins()),
-            shears: Shears::new(token, origin, direction, range, along, *like.axes),
+            shears: Shears::new(origin, direction, range, along, *like.axes),
         };
         Some((packet, extent, start))
     }
@@ -92,6 +93,7 @@ impl<T: Simd> Packet<T> {
             found,
             rays,
             axes,
+            ..
         } = asked;
         let shears = &mut self.shears;
         let (t_max, reciprocals) = (shears.t_max.to_array(), shears.along.reciprocal.to_array());

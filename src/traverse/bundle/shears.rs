@@ -23,8 +23,10 @@ pub(super) struct Asked<'a> {
     pub(super) lanes: u32,
     /// The lanes that have found something.
     pub(super) found: u32,
-    /// The packet's, and those after it.
+    /// The packet's, and those after it; or all.
     pub(super) rays: &'a [Ray],
+    /// The numbers of the lanes' rays among those.
+    pub(super) numbers: &'a [u8; LANES],
     /// Of the shear.
     pub(super) axes: &'static [usize; 3],
 }
@@ -46,35 +48,34 @@ impl<T: Simd> Shears<T> {
     /// Of rays that have found nothing so far. `reciprocal` is of the direction along the last of the axes of the shear.
     #[inline(always)]
     pub(super) fn new(
-        token: T,
         origin: [V<T>; 3],
         direction: [V<T>; 3],
         [t_min, t_max]: [V<T>; 2],
         reciprocal: V<T>,
         [kx, ky, _]: [usize; 3],
     ) -> Self {
-        let zero = V::<T>::splat(token, 0.0);
         Self {
             origin,
             slope: [direction[kx] * reciprocal, direction[ky] * reciprocal],
             along: Along { reciprocal, t_min },
             t_max,
-            u: zero,
-            v: zero,
-            places: zero,
+            // Whatever: to clear them takes longer.
+            u: t_max,
+            v: t_max,
+            places: t_max,
         }
     }
 
     /// The same of prepared rays, each as its caller gave it.
     #[inline(always)]
-    pub(super) fn of(token: T, rays: &[Ray; LANES], axes: [usize; 3]) -> Self {
+    pub(super) fn of(token: T, rays: [&Ray; LANES], axes: [usize; 3]) -> Self {
         let Eight {
             origin,
             direction,
             range,
         } = Eight::new(token, rays);
         let along = reciprocal(token, direction[axes[2]]);
-        Self::new(token, origin, direction, range, along, axes)
+        Self::new(origin, direction, range, along, axes)
     }
 
     /// All lanes at once, a triangle after the other. The lanes that have a new best hit.
@@ -90,6 +91,7 @@ impl<T: Simd> Shears<T> {
             mut lanes,
             mut found,
             rays,
+            numbers,
             axes,
         } = asked;
         let leaf = triangles.stored();
@@ -120,6 +122,7 @@ impl<T: Simd> Shears<T> {
                 triangles,
                 triangle,
                 rays,
+                numbers,
                 axes,
             };
             if !Q::CLOSEST {
@@ -168,6 +171,7 @@ struct OneTriangle<'a, R> {
     triangles: R,
     triangle: usize,
     rays: &'a [Ray],
+    numbers: &'a [u8; LANES],
     axes: &'static [usize; 3],
 }
 
@@ -175,7 +179,8 @@ impl<R: Triangles> Pairs for OneTriangle<'_, R> {
     #[inline(always)]
     fn pair(&self, lane: usize) -> Pair {
         // Lanes past the last ray are not among those that are asked for.
-        let ray = self.rays.get(lane).unwrap_or(&PreparedRay::ROOM);
+        let number = usize::from(self.numbers[lane % LANES]);
+        let ray = self.rays.get(number).unwrap_or(&PreparedRay::ROOM);
         Pair::new(&self.triangles.triangle(self.triangle), ray, self.axes)
     }
 }
