@@ -115,11 +115,11 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
         let Self(feed) = self;
         while feed.to_start == 0 {
             // Lanes past the last ray hit nothing.
-            let (mut rays, mut count) = ([&PreparedRay::ROOM; READY], 0);
+            let (mut rays, mut count) = ([PreparedRay::ROOM; READY], 0);
             while count < READY
                 && let Some(index) = feed.next_index()
             {
-                rays[count] = &feed.rays[index];
+                rays[count] = feed.rays[index];
                 feed.indices[count] = index;
                 count += 1;
             }
@@ -130,7 +130,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
                 origin,
                 direction,
                 range,
-            } = Eight::new(token, rays);
+            } = Eight::new(token, rays.each_ref());
             let bounds = feed.bvh.bounds();
             let ready = &mut feed.ready;
             let ordinary =
