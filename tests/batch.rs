@@ -319,3 +319,40 @@ fn more_rays_than_are_sorted_at_once() {
         }
     });
 }
+
+/// A ray whose range is of infinities, among others that are alike: what is worked out of it may be NaN, of theirs never.
+#[test]
+fn ranges_of_infinities_take_nothing_from_their_neighbours() {
+    let mesh = shapes::icosphere(3);
+    let view = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+    let eye = Vec3::new(0.1, 0.2, 5.0);
+    let camera: Vec<_> = (0..64)
+        .map(|i| {
+            let aim = Vec3::new((i % 8) as f32 - 3.5, (i / 8) as f32 - 3.5, 0.0) / 8.0;
+            Ray::new(eye, aim - eye)
+        })
+        .collect();
+    let answer = |ray: &Ray| reference::closest_hit(&view, ray);
+    let of_camera: Vec<_> = camera.iter().map(answer).collect();
+    assert!(of_camera.iter().all(Option::is_some));
+    let mut bvh = Builder::new().build(&view).unwrap();
+    let (inf, max) = (f32::INFINITY, f32::MAX);
+    for (t_min, t_max) in [(-inf, -inf), (-inf, -max), (-inf, inf), (max, inf)] {
+        for odd in 0..camera.len() {
+            let (mut rays, mut expected) = (camera.clone(), of_camera.clone());
+            rays[odd] = rays[odd].with_range(t_min, t_max);
+            expected[odd] = answer(&rays[odd]);
+            for backend in Backend::available() {
+                bvh.set_backend(backend);
+                let mut hits = vec![None; rays.len()];
+                bvh.closest_hits(&rays, &mut hits);
+                assert_same(&rays, &hits, &expected);
+                let mut occluded = vec![false; rays.len()];
+                bvh.any_hits(&rays, &mut occluded);
+                for (any, hit) in occluded.into_iter().zip(&expected) {
+                    assert_eq!(any, hit.is_some());
+                }
+            }
+        }
+    }
+}

@@ -143,7 +143,7 @@ fn most3<const N: usize, V: Vector<N>>([x, y, z]: [V; 3]) -> [f32; 3] {
     [most(x), most(y), most(z)]
 }
 
-/// The least lane.
+/// The least lane, none of which is NaN.
 #[inline(always)]
 pub(crate) fn least<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
     let mut least = numbers;
@@ -155,7 +155,7 @@ pub(crate) fn least<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
     least.to_array()[0]
 }
 
-/// The greatest lane.
+/// The greatest lane, none of which is NaN.
 #[inline(always)]
 pub(crate) fn most<const N: usize, V: Vector<N>>(numbers: V) -> f32 {
     let mut most = numbers;

@@ -206,7 +206,8 @@ impl<V> PreparedLanes<V> {
     }
 }
 
-/// Which rays, `largest` being the largest component of their directions, can hit something and need not be scaled.
+/// Which rays, `largest` being the largest component of their directions, can hit something and need not be scaled. Nothing
+/// that is worked out of them is NaN: of a range that ends at -∞ it would be.
 #[inline(always)]
 fn ordinary<const N: usize, V: Vector<N>>(
     token: V::Token,
@@ -224,6 +225,7 @@ fn ordinary<const N: usize, V: Vector<N>>(
         & (of_origin + of_direction).le(zero)
         & t_min.le(t_max)
         & t_min.lt(V::splat(token, f32::INFINITY))
+        & V::splat(token, f32::NEG_INFINITY).lt(t_max)
 }
 
 /// x, y and z of the origin and of the direction. The fourth number of each is of no meaning.
