@@ -90,9 +90,8 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
         let (part, out) = if whole {
             (rays, &mut *answers)
         } else {
-            let (gathered, found) = room.get_or_insert_with(|| {
-                ([PreparedRay::ROOM; bundle::RAYS], [Q::MISS; bundle::RAYS])
-            });
+            let (gathered, found) =
+                room.get_or_insert(([PreparedRay::ROOM; bundle::RAYS], [Q::MISS; bundle::RAYS]));
             for (ray, place) in gathered.iter_mut().zip(places(class)) {
                 *ray = rays[place];
             }
