@@ -2,8 +2,8 @@
 
 /// What a hierarchy is built for: once and traced for long, or anew for every picture.
 ///
-/// The answers are the same. On one thread of an Intel Xeon (Sapphire Rapids or later), over a scan of 70,000 triangles, one of 870,000, a kitchen
-/// and three game levels:
+/// The answers are the same. On one thread of an Intel Xeon (Sapphire Rapids or later), over a scan of 70,000 triangles, one
+/// of 870,000, a kitchen and three game levels:
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
@@ -11,8 +11,8 @@
 /// | [`Balanced`](Self::Balanced) | 337 to 442 | 0.96 |
 /// | [`Best`](Self::Best) | 702 to 1,231 | 1 |
 ///
-/// A Zen 4 (AMD EPYC) takes about as long, one of the first Zen generation up to twice that. What moves without changing can be
-/// [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.
+/// A Zen 4 (AMD EPYC) takes about as long, one of the first Zen generation up to twice that. What moves without
+/// changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {

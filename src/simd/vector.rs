@@ -35,7 +35,7 @@ pub trait Simd: Copy {
                 column[lane] = number;
             }
         }
-        load_all(self, &columns)
+        load_all(self, columns.each_ref())
     }
 
     /// In lane `i` lane `lanes[i]` modulo 8.
@@ -197,7 +197,7 @@ pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
 
 /// Eight vectors.
 #[inline(always)]
-pub fn load_all<S: Simd>(token: S, [a, b, c, d, e, f, g, h]: &[[f32; 8]; 8]) -> [S::F32x8; 8] {
+pub fn load_all<S: Simd>(token: S, [a, b, c, d, e, f, g, h]: [&[f32; 8]; 8]) -> [S::F32x8; 8] {
     [
         S::F32x8::load(token, a),
         S::F32x8::load(token, b),

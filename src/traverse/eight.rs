@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    simd::{Simd, Vector},
+    simd::{Simd, load_all},
 };
 
 /// Eight rays, a lane each.
@@ -16,16 +16,19 @@ pub(super) struct Eight<T: Simd> {
 impl<T: Simd> Eight<T> {
     #[inline(always)]
     pub(super) fn new(token: T, [a, b, c, d, e, f, g, h]: [&Ray; 8]) -> Self {
-        let rows = [
-            row(token, a),
-            row(token, b),
-            row(token, c),
-            row(token, d),
-            row(token, e),
-            row(token, f),
-            row(token, g),
-            row(token, h),
-        ];
+        let rows = load_all(
+            token,
+            [
+                bytemuck::cast_ref(a),
+                bytemuck::cast_ref(b),
+                bytemuck::cast_ref(c),
+                bytemuck::cast_ref(d),
+                bytemuck::cast_ref(e),
+                bytemuck::cast_ref(f),
+                bytemuck::cast_ref(g),
+                bytemuck::cast_ref(h),
+            ],
+        );
         let [ox, oy, oz, dx, dy, dz, t_min, t_max] = token.transpose(rows);
         Self {
             origin: [ox, oy, oz],
@@ -33,10 +36,4 @@ impl<T: Simd> Eight<T> {
             range: [t_min, t_max],
         }
     }
-}
-
-/// A ray's eight numbers.
-#[inline(always)]
-fn row<T: Simd>(token: T, ray: &Ray) -> T::F32x8 {
-    T::F32x8::load(token, bytemuck::cast_ref(ray))
 }
