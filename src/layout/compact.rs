@@ -10,7 +10,7 @@ use crate::{
     geometry::Aabb,
     layout::run,
     simd::{Lanes, Simd, Vector, packed_run},
-    slab::{BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane, pow2},
+    slab::{BundlePasses, BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane, pow2},
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, mem::offset_of};

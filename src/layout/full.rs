@@ -4,7 +4,7 @@ use super::{Child, Link, node::impl_wide_node};
 use crate::{
     geometry::Aabb,
     simd::{Lanes, Simd, Vector},
-    slab::{BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane},
+    slab::{BundlePasses, BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane},
 };
 use bytemuck::{Pod, Zeroable};
 use core::mem::offset_of;

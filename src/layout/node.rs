@@ -4,7 +4,7 @@ use super::{Child, Link};
 use crate::{
     geometry::Aabb,
     simd::{Lanes, PREFETCHED, Simd},
-    slab::{BundleSlabs, NarrowRay, Passing, RaySlabs},
+    slab::{BundlePasses, BundleSlabs, NarrowRay, Passing, RaySlabs},
 };
 use bytemuck::Pod;
 use glam::Vec3;
@@ -67,7 +67,7 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
         token: S,
         slabs: &BundleSlabs,
         t_max: Self::Lanes<S>,
-    ) -> (u32, Self::Lanes<S>);
+    ) -> BundlePasses<Self::Lanes<S>>;
     /// The planes of all children's boxes that a bundle's rays meet first, by axis, and those that they meet last.
     #[doc(hidden)]
     fn planes<S: Simd>(&self, token: S, slabs: &BundleSlabs) -> [[Self::Lanes<S>; 3]; 2];
@@ -199,10 +199,13 @@ macro_rules! impl_wide_node {
                 token: S,
                 slabs: &BundleSlabs,
                 t_max: Self::Lanes<S>,
-            ) -> (u32, Self::Lanes<S>) {
+            ) -> BundlePasses<Self::Lanes<S>> {
                 let planes = self.planes::<S::$vector>(token, slabs.first());
-                let (hit, near) = slabs.test(token, planes, t_max);
-                (self.present_bits(hit.bits()), near)
+                let passes = slabs.test(token, planes, t_max);
+                BundlePasses {
+                    any: self.present_bits(passes.any),
+                    ..passes
+                }
             }
 
             #[inline(always)]

@@ -33,6 +33,17 @@ pub struct BundleSlabs {
     direction: Vec3,
 }
 
+/// Which of the boxes of a node a bundle's rays pass, a child a lane.
+#[derive(Clone, Copy)]
+pub struct BundlePasses<V> {
+    /// A bit for each box that any of the rays may pass.
+    pub(crate) any: u32,
+    /// A bit for each box that all of them pass, or nearly.
+    pub(crate) all: u32,
+    /// From which `t` on any of them may meet it.
+    pub(crate) near: V,
+}
+
 /// [`BundleSlabs`] in the making: of the first ray in a lane, the second in the next, and so on.
 #[derive(Clone, Copy)]
 pub(crate) struct Bundling<V> {
@@ -109,27 +120,41 @@ impl BundleSlabs {
         FirstPlanes::new(self.direction)
     }
 
-    /// Which of the boxes any of the rays may meet up to `t_max`, raised by their margins, and from which `t` on: of the
-    /// planes that are met first and those that are met last.
+    /// Which of the boxes the rays pass up to `t_max`, raised by their margins: of the planes that are met first and those
+    /// that are met last.
     #[inline(always)]
     pub(crate) fn test<const N: usize, V: Vector<N>>(
         &self,
         token: V::Token,
         [near, far]: [[V; 3]; 2],
         t_max: V,
-    ) -> (V, V) {
-        let (mut enter, mut leave) = (V::splat(token, self.t_min), t_max);
+    ) -> BundlePasses<V> {
+        // Of the first of the rays and of the last.
+        let mut enter = [V::splat(token, self.t_min); 2];
+        let mut leave = [t_max; 2];
         for axis in 0..3 {
             let center = V::splat(token, self.center[axis]);
             let least = V::splat(token, self.reciprocal[0][axis]);
             let most = V::splat(token, self.reciprocal[1][axis]);
+            let first = V::splat(token, self.offset[0][axis]);
+            let last = V::splat(token, self.offset[1][axis]);
             let (near, far) = (near[axis] - center, far[axis] - center);
-            let near = (near * least).min(near * most) + V::splat(token, self.offset[0][axis]);
-            let far = (far * least).max(far * most) + V::splat(token, self.offset[1][axis]);
-            enter = near.max(enter);
-            leave = far.min(leave);
+            let (a, b) = (near * least, near * most);
+            enter = [
+                (a.min(b) + first).max(enter[0]),
+                (a.max(b) + last).max(enter[1]),
+            ];
+            let (a, b) = (far * least, far * most);
+            leave = [
+                (a.min(b) + first).min(leave[0]),
+                (a.max(b) + last).min(leave[1]),
+            ];
         }
-        (enter.le(leave), enter)
+        BundlePasses {
+            any: enter[0].le(leave[1]).bits(),
+            all: enter[1].le(leave[0]).bits(),
+            near: enter[0],
+        }
     }
 }
 

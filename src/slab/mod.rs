@@ -91,7 +91,7 @@ mod narrow;
 pub(crate) mod passing;
 mod prepared;
 
-pub use bundle::BundleSlabs;
+pub use bundle::{BundlePasses, BundleSlabs};
 pub(crate) use bundle::{Bundling, least, most};
 pub use narrow::NarrowRay;
 pub use passing::Passing;

@@ -2,7 +2,7 @@
 //! that are scattered over packets are put into new ones.
 
 use super::{
-    Bundle, LANES, first_packet,
+    Bundle, LANES, first_packet, packets_of,
     shears::{Asked, Shears, V},
 };
 use crate::{
@@ -142,14 +142,4 @@ impl<'a, T: Simd> Bundle<'a, T> {
             self.far = most(far);
         }
     }
-}
-
-/// How many packets have any of the rays.
-#[inline(always)]
-fn packets_of(rays: u64) -> u32 {
-    const { assert!(LANES == 8) };
-    // Each packet's bits brought down to its lowest.
-    let pairs = rays | rays >> 4;
-    let ones = pairs | pairs >> 2;
-    ((ones | ones >> 1) & 0x0101_0101_0101_0101).count_ones()
 }

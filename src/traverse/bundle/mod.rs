@@ -1,8 +1,8 @@
 //! Rays of about one origin and one direction, side by side through the tree.
 //!
 //! A node is tested once for all of them, by intervals; a child that any of them may meet is tested again for each, eight
-//! rays at a time; and so are the triangles of a leaf that is left. Where few are left, each is tested by itself, against all
-//! children at once. The camera's rays, and shadow rays towards one light, share most of their way.
+//! rays at a time, unless the intervals say that all pass; and so are the triangles of a leaf that is left. Where few are left,
+//! each is tested by itself, against all children at once. The camera's rays, and shadow rays towards one light, share most of their way.
 //!
 //! After Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005), and Overbeck, Ramamoorthi, Mark, "Large ray
 //! packets for real-time Whitted ray tracing" (2008): the rays that a node is for are kept as a mask. One by one: Barringer and
@@ -27,7 +27,9 @@ use crate::{
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, WideNode},
     primitive::triangle::bits,
     simd::{Lanes, Simd, Vector, splat3},
-    slab::{BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, least, most, passing},
+    slab::{
+        BundlePasses, BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, least, most, passing,
+    },
 };
 use core::mem::MaybeUninit;
 use glam::Vec3;
@@ -171,8 +173,8 @@ pub(super) fn count_boxes<T: Simd, N: WideNode>(
     let far = N::Lanes::<T>::splat(token, bundle.far);
     let mut passed = 0;
     for node in nodes {
-        let (hit, _) = node.test_bundle(token, &bundle.slabs, far);
-        passed += hit.count_ones();
+        let BundlePasses { any, .. } = node.test_bundle(token, &bundle.slabs, far);
+        passed += any.count_ones();
     }
     Some(passed)
 }
@@ -278,10 +280,16 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 if entry.lane == Entry::TESTED {
                     break;
                 }
-                // SAFETY: it was walked through.
-                let parent = unsafe { bvh.node(entry.parent) };
-                let [near, far] = parent.child_planes(entry.lane as usize, direction);
-                rays = self.passing(token, near, far, rays);
+                // Those that have found something may look less far.
+                if entry.by_all && self.found & rays == 0 {
+                    let (tests, passes) = (packets_of(rays), rays.count_ones());
+                    self.tightness.add(tests as usize, passes as usize);
+                } else {
+                    // SAFETY: it was walked through.
+                    let parent = unsafe { bvh.node(entry.parent) };
+                    let [near, far] = parent.child_planes(entry.lane as usize, direction);
+                    rays = self.passing(token, near, far, rays);
+                }
                 if rays != 0 {
                     if given_up_at.contains(&self.tightness.tests()) && self.tightness.is_loose() {
                         return false;
@@ -306,18 +314,19 @@ impl<'a, T: Simd> Bundle<'a, T> {
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { bvh.node(current) };
         let far = N::Lanes::<T>::splat(token, self.far);
-        let (hit, near) = node.test_bundle(token, &self.slabs, far);
+        let BundlePasses { any, all, near } = node.test_bundle(token, &self.slabs, far);
         let near = near.to_array();
         let base = *len;
-        for lane in bits(hit) {
-            // SAFETY: `hit` has bits for the node's lanes alone, `near` is of as many. The layout's check saw that a walk leaves
+        for lane in bits(any) {
+            // SAFETY: `any` has bits for the node's lanes alone, `near` is of as many. The layout's check saw that a walk leaves
             // less than `STACK` children behind, so there is room for the one that it goes on to.
             unsafe {
                 let entry = Entry {
                     link: node.link(lane),
                     near: *near.as_ref().get_unchecked(lane),
                     parent: current,
-                    lane: lane as u32,
+                    lane: lane as u8,
+                    by_all: all >> lane & 1 != 0,
                     rays,
                 };
                 insert(token, bvh, ways, base, len, entry);
@@ -370,6 +379,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                     near,
                     parent: current,
                     lane: Entry::TESTED,
+                    by_all: false,
                     rays: u64::from(high) << 32 | u64::from(low),
                 };
                 insert(token, bvh, ways, base, len, entry);
@@ -393,6 +403,16 @@ impl<'a, T: Simd> Bundle<'a, T> {
         self.tightness.add(tests, passing.count_ones() as usize);
         passing
     }
+}
+
+/// How many packets have any of the rays.
+#[inline(always)]
+fn packets_of(rays: u64) -> u32 {
+    const { assert!(LANES == 8) };
+    // Each packet's bits brought down to its lowest.
+    let pairs = rays | rays >> 4;
+    let ones = pairs | pairs >> 2;
+    ((ones | ones >> 1) & 0x0101_0101_0101_0101).count_ones()
 }
 
 /// The first packet that has any of the rays. Takes its rays from them.

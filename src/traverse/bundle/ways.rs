@@ -15,13 +15,15 @@ pub(super) struct Entry {
     /// The node whose child it is.
     pub parent: Link,
     /// Its lane there if the rays are still to be tested against its box, else [`TESTED`](Self::TESTED).
-    pub lane: u32,
+    pub lane: u8,
+    /// Whether all of the bundle's rays pass the box, or nearly, as far as it was known then.
+    pub by_all: bool,
     pub rays: u64,
 }
 
 impl Entry {
     /// No lane.
-    pub(super) const TESTED: u32 = u32::MAX;
+    pub(super) const TESTED: u8 = u8::MAX;
 }
 
 /// A stack of them. How many there are is known apart, so that it stays in a register.
