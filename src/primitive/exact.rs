@@ -3,7 +3,9 @@
 //! One lane at a time: in a scene of large walls some tenth of all hits come here, in one of small triangles hardly any.
 //! Where processors have no `f64` it is emulated, in a few kilobytes of code: so one formula answers two questions.
 
+use super::triangle::Corners;
 use crate::{geometry::Ray, slab::UNIT_ROUNDOFF};
+use core::ptr;
 
 /// The triangles and the rays that are tested, as they were before the shear.
 pub trait Pairs: Copy {
@@ -34,15 +36,27 @@ impl Pair {
             direction: along(ray.direction.as_ref()),
         }
     }
+}
 
-    /// A corner after the shear, x and y times the direction's z.
-    fn shear(&self, corner: usize) -> [f64; 3] {
-        let [x, y, z] = self.corners[corner % 3];
-        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction.map(f64::from));
-        let less = |p: f32, q: f32| f64::from(p) - f64::from(q);
-        let z = less(z, oz);
-        [less(x, ox) * dz - dx * z, less(y, oy) * dz - dy * z, z]
-    }
+/// A corner after the shear, x and y times the direction's z.
+fn shear(corner: &[f32; 3], origin: &[f64; 3], direction: &[f64; 3]) -> [f64; 3] {
+    let ([x, y, z], [ox, oy, oz], [dx, dy, dz]) = (read(corner), origin, direction);
+    let z = z - oz;
+    [(x - ox) * dz - dx * z, (y - oy) * dz - dy * z, z]
+}
+
+/// Numbers that were written one by one, read one by one. Compilers would read several at once, and of what it has not yet
+/// written to its cache a processor gives no two together: all that was begun before would be waited for.
+fn read([x, y, z]: &[f32; 3]) -> [f64; 3] {
+    // SAFETY: of references.
+    let [x, y, z] = unsafe {
+        [
+            ptr::read_volatile(x),
+            ptr::read_volatile(y),
+            ptr::read_volatile(z),
+        ]
+    };
+    [f64::from(x), f64::from(y), f64::from(z)]
 }
 
 impl Pairs for Pair {
@@ -64,39 +78,66 @@ pub(super) enum Open {
     Both,
 }
 
-/// `t`, `u` and `v` of a triangle, or `None` for a miss by the exact signs of the edge functions.
+/// Whether a triangle is hit by the exact signs of the edge functions, and if so `t`, `u` and `v`, to `hit`. `sheared` are its
+/// corners, in a lane of several.
 ///
 /// If the place is open they are those of the triangle and the ray as given, to what `f32` holds, if these meet and `t` is
 /// about what was said. Else, where these do not meet but for the rounding of the shear, they are those of the triangle as
 /// sheared.
 #[cold]
 #[inline(never)]
-pub(super) fn exact_hit(pair: &Pair, corners: [[f32; 3]; 3], open: Open) -> Option<[f32; 3]> {
+pub(super) fn exact_hit<const N: usize>(
+    pair: &Pair,
+    sheared: &Corners<[f32; N]>,
+    lane: usize,
+    open: Open,
+    hit: &mut [f32; 3],
+) -> bool {
     let along = pair.direction[2];
-    let sheared = Pair {
-        corners,
-        origin: [0.0; 3],
-        direction: [0.0, 0.0, 1.0],
+    let as_sheared = |hit: &mut [f32; 3]| {
+        let lane = lane % N;
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = sheared;
+        let pair = Pair {
+            corners: [
+                [ax[lane], ay[lane], az[lane]],
+                [bx[lane], by[lane], bz[lane]],
+                [cx[lane], cy[lane], cz[lane]],
+            ],
+            origin: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+        };
+        solve(&pair, along, 0.0, hit)
     };
-    let as_sheared = || solve(&sheared, along, 0.0);
-    let as_given = || solve(pair, along, f64::from(UNIT_ROUNDOFF));
+    let as_given = |hit: &mut [f32; 3]| solve(pair, along, f64::from(UNIT_ROUNDOFF), hit);
     match open {
-        Open::Signs => as_sheared(),
-        Open::Both => as_sheared().map(|sheared| as_given().unwrap_or(sheared)),
-        Open::Place { about, error } => as_given()
-            .filter(|[t, ..]| (t - about).abs() <= error)
-            .or_else(as_sheared),
+        Open::Signs => as_sheared(hit),
+        Open::Both => {
+            let is_hit = as_sheared(hit);
+            if is_hit {
+                as_given(hit);
+            }
+            is_hit
+        }
+        Open::Place { about, error } => {
+            as_given(hit) && (hit[0] - about).abs() <= error || as_sheared(hit)
+        }
     }
 }
 
-/// `t`, for `along` a unit of z, `u` and `v` where a ray meets a triangle, if it does, and the triangle's area, as the ray
-/// sees it, is not less than `least` of what it is the difference of.
+/// Whether a ray meets a triangle, and the triangle's area, as the ray sees it, is not less than `least` of what it is the
+/// difference of; if so `t`, for `along` a unit of z, `u` and `v`, to `hit`.
 ///
 /// The test of this module in `f64`: the corners after the shear are off by 2^-50 of the greatest coordinate, those of a
 /// ray from 0 along z not at all.
 #[inline(never)]
-fn solve(pair: &Pair, along: f32, least: f64) -> Option<[f32; 3]> {
-    let (a, b, c) = (pair.shear(0), pair.shear(1), pair.shear(2));
+fn solve(pair: &Pair, along: f32, least: f64, hit: &mut [f32; 3]) -> bool {
+    let (origin, direction) = (read(&pair.origin), read(&pair.direction));
+    let [a, b, c] = &pair.corners;
+    let [a, b, c] = [
+        shear(a, &origin, &direction),
+        shear(b, &origin, &direction),
+        shear(c, &origin, &direction),
+    ];
     let mut largest = 0;
     let wa = edge(&c, &b, &mut largest);
     let wb = edge(&a, &c, &mut largest);
@@ -113,14 +154,15 @@ fn solve(pair: &Pair, along: f32, least: f64) -> Option<[f32; 3]> {
         || size < magnitude(f64::from_bits(largest) * least)
         || size >= magnitude(f64::INFINITY)
     {
-        return None;
+        return false;
     }
     let z = wa * a[2] + wb * b[2] + wc * c[2];
     let along = f64::from(along);
     let scale = reciprocal64(area * along);
     let t = (z * scale) as f32 + 0.0;
     let scale = scale * along;
-    Some([t, (wb * scale) as f32, (wc * scale) as f32])
+    *hit = [t, (wb * scale) as f32, (wc * scale) as f32];
+    true
 }
 
 /// On which side of the edge from p to q 0 lies. `largest` becomes no less than the magnitudes of what it is the difference

@@ -414,12 +414,6 @@ impl<V> Along<V> {
             ];
             for lane in bits(candidates & !mask) {
                 let at = lane % N;
-                let [a, b, c] = &sheared;
-                let sheared = [
-                    [a[0][at], a[1][at], a[2][at]],
-                    [b[0][at], b[1][at], b[2][at]],
-                    [c[0][at], c[1][at], c[2][at]],
-                ];
                 let open = match (sound >> lane & 1, precise >> lane & 1) {
                     (1, _) => Open::Place {
                         about: estimates[at],
@@ -428,7 +422,8 @@ impl<V> Along<V> {
                     (_, 1) => Open::Signs,
                     _ => Open::Both,
                 };
-                if let Some(hit) = exact_hit(&pairs.pair(lane), sheared, open) {
+                let mut hit = [0.0; 3];
+                if exact_hit(&pairs.pair(lane), &sheared, lane, open, &mut hit) {
                     t = t.replace(token, lane, hit[0]);
                     u = u.replace(token, lane, hit[1]);
                     v = v.replace(token, lane, hit[2]);
