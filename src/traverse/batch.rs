@@ -192,7 +192,6 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
     fn run<T: Simd>(self, token: T) {
         let bvh = self.bvh;
         let (rays, answers) = paired(self.rays, self.answers);
-        let Scratch(mut lanes) = Scratch::<LANES>::new();
         let mut patience = Patience::default();
         for (rays, answers) in rays.chunks(WINDOW).zip(answers.chunks_mut(WINDOW)) {
             let mut waiting = [0; feed::GROUPS];
@@ -203,8 +202,38 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            trace_rest::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, &waiting, &mut lanes);
+            // By a call: what bundles need of registers and of the stack is not taken from waves.
+            bvh.backend().call(Rest::<N, L, S, Q> {
+                bvh,
+                rays,
+                answers,
+                waiting: &waiting,
+            });
         }
+    }
+}
+
+/// The rays of a window that `waiting` has bits for.
+struct Rest<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
+    bvh: &'a Bvh<N, L, S>,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    waiting: &'a [u64; feed::GROUPS],
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Rest<'_, N, L, S, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) {
+        let Self {
+            bvh,
+            rays,
+            answers,
+            waiting,
+        } = self;
+        let Scratch(mut lanes) = Scratch::<LANES>::new();
+        trace_rest::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, waiting, &mut lanes);
     }
 }
 
