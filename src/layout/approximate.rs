@@ -5,7 +5,7 @@ use super::{
     Triangles, WideNode,
 };
 use crate::{
-    primitive::triangle::{InFloats, Look, Precision, RayShear, TriangleHits},
+    primitive::triangle::{Aim, InFloats, Look, Precision, RayShear, TriangleHits},
     simd::Simd,
 };
 use core::{marker::PhantomData, mem::MaybeUninit, ops::Range};
@@ -115,14 +115,14 @@ impl<R: Triangles> Triangles for ApproximateRef<R> {
     }
 
     #[inline(always)]
-    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+    fn finish<S: Simd, P: Precision, A: Aim>(
         self,
         token: S,
         ray: &RayShear,
         look: Look<R::Lanes<S>>,
         t_max: f32,
     ) -> TriangleHits<R::Lanes<S>> {
-        self.0.finish::<S, P, NEED_T>(token, ray, look, t_max)
+        self.0.finish::<S, P, A>(token, ray, look, t_max)
     }
 
     #[inline(always)]

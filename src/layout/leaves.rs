@@ -4,7 +4,7 @@ use super::{Borrowed, Gather, LayoutError, Leaf, Storage};
 use crate::{
     primitive::{
         exact::{Pair, Pairs},
-        triangle::{Look, Precision, RayShear, TriangleHits},
+        triangle::{Aim, Look, Precision, RayShear, TriangleHits, Whether},
     },
     simd::{Lanes, Simd},
 };
@@ -149,7 +149,7 @@ pub trait Triangles: Copy {
     /// Which of them the ray may hit, and what the rest of the test works on.
     fn look<S: Simd>(self, token: S, ray: &RayShear) -> Look<Self::Lanes<S>>;
     /// The rest of the test, in some precision.
-    fn finish<S: Simd, P: Precision, const NEED_T: bool>(
+    fn finish<S: Simd, P: Precision, A: Aim>(
         self,
         token: S,
         ray: &RayShear,
@@ -173,11 +173,11 @@ pub trait Triangles: Copy {
     #[inline(always)]
     fn is_hit<S: Simd>(self, token: S, ray: &RayShear, t_max: f32) -> bool {
         if !S::IN_FOURS {
-            let hits = self.test::<S, false>(token, ray, t_max);
+            let hits = self.test::<S, Whether>(token, ray, t_max);
             return hits.is_some_and(|hits| hits.mask != 0);
         }
         for four in self.fours() {
-            let hits = four.test::<S, false>(token, ray, t_max);
+            let hits = four.test::<S, Whether>(token, ray, t_max);
             if hits.is_some_and(|hits| hits.mask != 0) {
                 return true;
             }
@@ -185,10 +185,9 @@ pub trait Triangles: Copy {
         false
     }
 
-    /// The ray against all of them, up to `t_max`. If `NEED_T` is not set, it is enough to know whether any is hit. `None` if
-    /// none is as soon as the first look shows.
+    /// The ray against all of them, up to `t_max`. `None` if none is hit as soon as the first look shows.
     #[inline(always)]
-    fn test<S: Simd, const NEED_T: bool>(
+    fn test<S: Simd, A: Aim>(
         self,
         token: S,
         ray: &RayShear,
@@ -198,7 +197,7 @@ pub trait Triangles: Copy {
         if !look.may_hit() {
             return None;
         }
-        Some(self.finish::<S, Self::Precision, NEED_T>(token, ray, look, t_max))
+        Some(self.finish::<S, Self::Precision, A>(token, ray, look, t_max))
     }
 }
 
@@ -221,7 +220,7 @@ macro_rules! in_lanes {
         fn finish<
             S: $crate::simd::Simd,
             P: $crate::primitive::triangle::Precision,
-            const NEED_T: bool,
+            A: $crate::primitive::triangle::Aim,
         >(
             self,
             token: S,
@@ -230,7 +229,7 @@ macro_rules! in_lanes {
             t_max: f32,
         ) -> $crate::primitive::triangle::TriangleHits<S::$vector> {
             let pairs = $crate::layout::leaves::OneRay(self, ray);
-            look.finish::<$lanes, NEED_T, P, _>(token, ray, t_max, pairs)
+            look.finish::<$lanes, A, P, _>(token, ray, t_max, pairs)
         }
     };
 }

@@ -152,7 +152,7 @@ impl<V> Look<V> {
 
     /// The rest of the test, of the same ray: [`Along::test`].
     #[inline(always)]
-    pub(crate) fn finish<const N: usize, const NEED_T: bool, P: Precision, O: Pairs>(
+    pub(crate) fn finish<const N: usize, A: Aim, P: Precision, O: Pairs>(
         self,
         token: V::Token,
         ray: &RayShear,
@@ -164,7 +164,7 @@ impl<V> Look<V> {
     {
         let Self { corners, edges } = self;
         let t_max = V::splat(token, t_max);
-        (ray.along(token)).test::<N, NEED_T, P, O>(token, corners, edges, t_max, pairs)
+        (ray.along(token)).test::<N, A, P, O>(token, corners, edges, t_max, pairs)
     }
 }
 
@@ -205,6 +205,35 @@ impl<V: Copy + Sub<Output = V> + Mul<Output = V>> Sheared<V> {
             z,
         }
     }
+}
+
+/// What is to be found out about triangles.
+pub trait Aim {
+    /// Whether `t` is needed. Else it is enough to know whether any is hit.
+    const NEED_T: bool;
+    /// Whether it is worth a branch that `f32` leaves nothing open.
+    const BRANCHES: bool;
+}
+
+/// Whether any is hit.
+pub enum Whether {}
+impl Aim for Whether {
+    const NEED_T: bool = false;
+    const BRANCHES: bool = false;
+}
+
+/// Where they are hit.
+pub enum Where {}
+impl Aim for Where {
+    const NEED_T: bool = true;
+    const BRANCHES: bool = true;
+}
+
+/// The same where a branch is guessed badly, since each ray goes its own way, or where code is to be short.
+pub enum WhereUnbranched {}
+impl Aim for WhereUnbranched {
+    const NEED_T: bool = true;
+    const BRANCHES: bool = false;
 }
 
 /// What a ray found among `N` triangles.
@@ -330,16 +359,15 @@ impl RayShear<'_> {
         if !look.may_hit() {
             return None;
         }
-        let hit = look.finish::<1, true, P, _>(token, self, t_max, self.pair(triangle));
+        let hit = look.finish::<1, WhereUnbranched, P, _>(token, self, t_max, self.pair(triangle));
         (hit.mask != 0).then_some([hit.t.0, hit.u.0, hit.v.0])
     }
 }
 
 impl<V> Along<V> {
-    /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`. If `NEED_T` is not
-    /// set, it is enough to know whether there are any.
+    /// The triangles, of those that may be hit, that are hit within the ray's range up to `t_max`.
     #[inline(always)]
-    pub(crate) fn test<const N: usize, const NEED_T: bool, P: Precision, O: Pairs>(
+    pub(crate) fn test<const N: usize, A: Aim, P: Precision, O: Pairs>(
         &self,
         token: V::Token,
         corners: Corners<V>,
@@ -389,6 +417,10 @@ impl<V> Along<V> {
         let precise = ordinary & doubt.le(z.abs() * V::splat(token, CONDITION));
         let certain = sound & precise;
 
+        if A::BRANCHES && candidates & !certain.bits() == 0 {
+            return self.within_range(token, candidates, [t, u, v], t_max);
+        }
+
         // How far `t` may be off, twice over: where it cannot matter, no better one is worked out.
         let error = (doubt + az.abs()) * (reciprocal.abs() * V::splat(token, 32.0 * UNIT_ROUNDOFF));
         let (least_t, most_t) = (t - error, t + error);
@@ -397,7 +429,7 @@ impl<V> Along<V> {
         let outside = sound & t.abs().lt(infinity) & (most_t.lt(t_min) | t_max.lt(least_t));
         let candidates = candidates & !outside.bits();
         let mut mask = candidates & certain.bits();
-        if !NEED_T {
+        if !A::NEED_T {
             let inside = sound & t_min.le(least_t) & most_t.le(t_max) & most_t.abs().lt(infinity);
             let mask = candidates & inside.bits();
             if mask != 0 {

@@ -6,7 +6,7 @@ use super::bundle;
 use crate::{
     geometry::{Aabb, Ray},
     layout::{TriangleLeaf, Triangles, WideNode},
-    primitive::triangle::RayShear,
+    primitive::triangle::{RayShear, Where},
     simd::{Backend, Lanes, Operation, Simd},
     slab::{NarrowRay, PreparedRay, reach_of},
 };
@@ -70,7 +70,7 @@ pub fn count_triangles(backend: Backend, leaves: &[TriangleLeaf], ray: &Ray) -> 
             let shear = RayShear::new(&prepared, prepared.along());
             let mut count = 0;
             for leaf in self.0 {
-                if let Some(hits) = leaf.test::<T, true>(token, &shear, prepared.ray.t_max) {
+                if let Some(hits) = leaf.test::<T, Where>(token, &shear, prepared.ray.t_max) {
                     count += hits.mask.count_ones();
                 }
             }

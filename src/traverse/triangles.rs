@@ -9,7 +9,7 @@ use super::{
 use crate::{
     geometry::{Hit, Ray},
     layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode},
-    primitive::triangle::{RayShear, TriangleHits, bits},
+    primitive::triangle::{RayShear, TriangleHits, Where, bits},
     simd::{Lanes, Operation, Simd},
     slab::{NarrowRay, PreparedRay},
 };
@@ -63,7 +63,7 @@ impl Found {
         shear: &RayShear,
         primitives: &[u32],
     ) -> bool {
-        let Some(hits) = leaf.test::<T, true>(token, shear, *t_max) else {
+        let Some(hits) = leaf.test::<T, Where>(token, shear, *t_max) else {
             return false;
         };
         Self::choose(best, t_max, leaf, hits, primitives)

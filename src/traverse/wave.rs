@@ -17,7 +17,7 @@ use super::{feed::Feed, query::Query, triangles::Found};
 use crate::{
     geometry::Ray,
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, Triangles, WideNode},
-    primitive::triangle::RayShear,
+    primitive::triangle::{RayShear, WhereUnbranched},
     simd::{Lanes, Simd, Vector},
     slab::{NarrowRay, reach_of},
 };
@@ -298,7 +298,7 @@ impl Lane {
         let leaf = unsafe { bvh.leaf(self.current.leaf()) };
         let shear = RayShear::of(&self.ray, self.narrow.axes(), self.narrow.along());
         if Q::CLOSEST {
-            if let Some(hits) = leaf.test::<T, true>(token, &shear, self.t_max) {
+            if let Some(hits) = leaf.test::<T, WhereUnbranched>(token, &shear, self.t_max) {
                 let best = &mut self.found;
                 Found::choose_unbranched(best, &mut self.t_max, leaf, hits, bvh.primitives());
                 // Its number is read when the ray has ended.

@@ -6,7 +6,7 @@ use crate::{
     layout::{Gathered, Triangles},
     primitive::{
         exact::{Pair, Pairs},
-        triangle::{Along, Edges, Sheared, bits},
+        triangle::{Along, Edges, Sheared, Where, Whether, bits},
     },
     simd::{Lanes, Simd, Vector, splat3},
     slab::{PreparedRay, reciprocal},
@@ -128,7 +128,7 @@ impl<T: Simd> Shears<T> {
             if !Q::CLOSEST {
                 // Not all lanes that are hit at once, but some if there are any.
                 while edges.candidates != 0 {
-                    let hits = (self.along).test::<LANES, false, G::Precision, _>(
+                    let hits = (self.along).test::<LANES, Whether, G::Precision, _>(
                         token, corners, edges, self.t_max, pairs,
                     );
                     if hits.mask == 0 {
@@ -144,7 +144,7 @@ impl<T: Simd> Shears<T> {
                 continue;
             }
             let hits = (self.along)
-                .test::<LANES, true, G::Precision, _>(token, corners, edges, self.t_max, pairs);
+                .test::<LANES, Where, G::Precision, _>(token, corners, edges, self.t_max, pairs);
             let nearer = hits.t.lt(self.t_max).bits() | !found;
             let mut closer = hits.mask & nearer;
             for lane in bits(hits.mask & !nearer) {
