@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 80 to 92 | 0.77 |
-/// | [`Balanced`](Self::Balanced) | 337 to 442 | 0.96 |
-/// | [`Best`](Self::Best) | 702 to 1,231 | 1 |
+/// | [`Fast`](Self::Fast) | 68 to 78 | 0.77 |
+/// | [`Balanced`](Self::Balanced) | 270 to 408 | 0.96 |
+/// | [`Best`](Self::Best) | 575 to 1,105 | 1 |
 ///
 /// A Zen 4 (AMD EPYC) takes about as long, one of the first Zen generation up to twice that. What moves without
 /// changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.
