@@ -48,7 +48,7 @@ fn shear(corner: &[f32; 3], origin: &[f64; 3], direction: &[f64; 3]) -> [f64; 3]
 /// Numbers that were written one by one, read one by one. Compilers would read several at once, and of what it has not yet
 /// written to its cache a processor gives no two together: all that was begun before would be waited for.
 fn read([x, y, z]: &[f32; 3]) -> [f64; 3] {
-    // SAFETY: of references.
+    // SAFETY: references are good for reads.
     let [x, y, z] = unsafe {
         [
             ptr::read_volatile(x),

@@ -2,7 +2,8 @@
 //!
 //! A node is tested once for all of them, by intervals; a child that any of them may meet is tested again for each, eight
 //! rays at a time, unless the intervals say that all pass; and so are the triangles of a leaf that is left. Where few are left,
-//! each is tested by itself, against all children at once. The camera's rays, and shadow rays towards one light, share most of their way.
+//! each is tested by itself, against all children at once. The camera's rays, and shadow rays towards one light, share most of
+//! their way.
 //!
 //! After Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005), and Overbeck, Ramamoorthi, Mark, "Large ray
 //! packets for real-time Whitted ray tracing" (2008): the rays that a node is for are kept as a mask. One by one: Barringer and
