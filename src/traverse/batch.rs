@@ -202,7 +202,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            // By a call: what bundles need of registers and of the stack is not taken from waves.
+            // By a call: what bundles need of registers is not taken from waves.
             bvh.backend().call(Rest::<N, L, S, Q> {
                 bvh,
                 rays,
@@ -226,14 +226,15 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Rest<'_
 
     #[inline(always)]
     fn run<T: Simd>(self, token: T) {
-        let Self {
-            bvh,
-            rays,
-            answers,
-            waiting,
-        } = self;
         let Scratch(mut lanes) = Scratch::<LANES>::new();
-        trace_rest::<T, N, L, S, Q, LANES>(token, bvh, rays, answers, waiting, &mut lanes);
+        trace_rest::<T, N, L, S, Q, LANES>(
+            token,
+            self.bvh,
+            self.rays,
+            self.answers,
+            self.waiting,
+            &mut lanes,
+        );
     }
 }
 
