@@ -3,7 +3,7 @@
 use super::{Child, Link};
 use crate::{
     geometry::Aabb,
-    simd::{Lanes, PREFETCHED, Simd},
+    simd::{Lanes, PREFETCHED, Simd, Vector},
     slab::{BundlePasses, BundleSlabs, NarrowRay, Passing, RaySlabs},
 };
 use bytemuck::Pod;
@@ -74,16 +74,16 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
     /// Of children, a bit each, those that there are.
     #[doc(hidden)]
     fn present(&self, children: u32) -> u32;
-    /// As [`test`](Self::test), of [planes](Self::planes) and the ray in lane `ray` modulo 8 of eight, which is number `ray` in
+    /// As [`test`](Self::test), of [planes](Self::planes) and the ray in lane `ray` modulo `RAYS` of as many, which is number `ray` in
     /// `passing`. Children that there are not are left in.
     #[doc(hidden)]
-    fn test_one_of<S: Simd>(
-        planes: &[[Self::Lanes<S>; 3]; 2],
-        token: S,
-        slabs: &RaySlabs<8, S::F32x8>,
-        t_max: &S::F32x8,
+    fn test_one_of<const RAYS: usize, V: Vector<RAYS>>(
+        planes: &[[Self::Lanes<V::Token>; 3]; 2],
+        token: V::Token,
+        slabs: &RaySlabs<RAYS, V>,
+        t_max: &V,
         ray: usize,
-        passing: &mut Passing<Self::Lanes<S>>,
+        passing: &mut Passing<Self::Lanes<V::Token>>,
     );
     /// The planes of a child's box that rays of this direction meet first, and those they meet last.
     #[doc(hidden)]
@@ -219,16 +219,16 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn test_one_of<S: Simd>(
-                &[near, far]: &[[S::$vector; 3]; 2],
-                token: S,
-                slabs: &RaySlabs<8, S::F32x8>,
-                t_max: &S::F32x8,
+            fn test_one_of<const RAYS: usize, V: Vector<RAYS>>(
+                &[near, far]: &[[Self::Lanes<V::Token>; 3]; 2],
+                token: V::Token,
+                slabs: &RaySlabs<RAYS, V>,
+                t_max: &V,
                 ray: usize,
-                passing: &mut Passing<S::$vector>,
+                passing: &mut Passing<Self::Lanes<V::Token>>,
             ) {
-                let t_max = <S::$vector>::splat(token, lane(t_max, ray));
-                let slabs: RaySlabs<$width, S::$vector> = slabs.of_lane(token, ray);
+                let t_max = Self::Lanes::<V::Token>::splat(token, lane(t_max, ray));
+                let slabs: RaySlabs<$width, Self::Lanes<V::Token>> = slabs.of_lane(token, ray);
                 let (hit, near) = slabs.between(near, far, t_max);
                 passing.add(token, ray, hit, near);
             }

@@ -1,41 +1,63 @@
-//! The backend of x86-64 processors with AVX2, FMA and BMI: Haswell (2013), Zen (2017) and later.
+//! The backend of x86-64 processors with AVX2, FMA and BMI: Haswell (2013), Zen (2017) and later; and what that of
+//! [AVX-512](super::avx512) has of it.
 
 use super::{
-    Lanes, Simd, Vector,
+    Lanes, PacketOperation, Simd, Vector, avx512, load_all,
     vector::{MAX_RUN, RUN_FIRST_BITS},
 };
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-/// A proof that the processor has AVX2, FMA, BMI1, BMI2 and POPCNT.
+/// A proof that the processor has AVX2, FMA, BMI1, BMI2 and POPCNT, and with `AVX512` its F, VL, DQ and BW as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Avx2(());
+pub struct X86<const AVX512: bool>(());
+
+/// Without AVX-512, or not asked for it.
+pub type Avx2 = X86<false>;
 
 impl Avx2 {
     /// The token, if this processor has the instructions. Asks the processor once a program.
     #[inline]
     pub(crate) fn detect() -> Option<Self> {
         cpufeatures::new!(detected, "avx2", "fma", "bmi1", "bmi2", "popcnt");
-        detected::get().then_some(Self(()))
+        detected::get().then_some(X86(()))
+    }
+
+    /// With AVX-512.
+    ///
+    /// # Safety
+    /// The processor has it: F, VL, DQ and BW.
+    #[inline(always)]
+    pub(super) unsafe fn with_avx512(self) -> X86<true> {
+        X86(())
     }
 }
 
-impl Simd for Avx2 {
-    type F32x4 = F32x4;
-    type F32x8 = F32x8;
+impl<const AVX512: bool> Simd for X86<AVX512> {
+    type F32x4 = F32x4<AVX512>;
+    type F32x8 = F32x8<AVX512>;
 
     const INTERLEAVES: bool = true;
 
     #[inline(always)]
-    fn transpose(self, rows: [F32x8; 8]) -> [F32x8; 8] {
+    fn transpose(self, rows: [Self::F32x8; 8]) -> [Self::F32x8; 8] {
         // SAFETY: the token says that the instructions are there.
         unsafe { transpose(rows) }
     }
 
     #[inline(always)]
-    fn coordinates(self, points: [&[f32; 3]; 4]) -> [F32x4; 3] {
+    fn coordinates(self, points: [&[f32; 3]; 4]) -> [Self::F32x4; 3] {
         // SAFETY: the token says that the instructions are there.
         unsafe { coordinates(points) }
+    }
+
+    #[inline(always)]
+    fn in_packets<O: PacketOperation>(self, operation: O) -> O::Output {
+        if AVX512 {
+            operation.run::<16, avx512::F32x16>(X86(()))
+        } else {
+            operation.run::<8, Self::F32x8>(self)
+        }
     }
 
     #[inline(always)]
@@ -52,53 +74,57 @@ impl Simd for Avx2 {
     }
 }
 
-/// Four floats. Made from an [`Avx2`] token or another vector alone.
+/// Four floats. Made from an [`X86`] token or another vector alone.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct F32x4(__m128);
+pub struct F32x4<const AVX512: bool>(__m128);
 
-/// Eight floats. Made from an [`Avx2`] token or another vector alone.
+/// Eight floats. Made from an [`X86`] token or another vector alone.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub struct F32x8(__m256);
+pub struct F32x8<const AVX512: bool>(__m256);
 
 macro_rules! impl_operator {
-    ($vector:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
-        impl $trait for $vector {
+    ([$($generic:tt)*] $vector:ty, $trait:ident, $method:ident, $intrinsic:ident) => {
+        impl<$($generic)*> $trait for $vector {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                // SAFETY: a vector of this module exists only where an `Avx2` token was given.
+                // SAFETY: a vector exists only where the token for its instructions was given.
                 Self(unsafe { $intrinsic(self.0, other.0) })
             }
         }
     };
 }
 
+/// `$vector`, with the instructions named, and what else it has of [`Vector`].
 macro_rules! impl_vector {
     (
-        $vector:ident, $n:literal, $splat:ident, $load:ident, $store:ident,
+        [$($generic:tt)*] $vector:ty, $token:ty, $n:literal,
+        $splat:ident, $load:ident, $store:ident,
         $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident, $or:ident, $andnot:ident,
-        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident, $least:ident, $of_bits:ident, $of_bytes:ident, $links:ident,
-        $to_int:ident, $from_int:ident, $max_int:ident, $min_int:ident
+        $fmadd:ident, $min:ident, $max:ident, $cmp:ident, $blend:ident, $movemask:ident, $permute:ident,
+        $least:ident, $compress:ident, $of_bits:ident, $of_bytes:ident,
+        $to_int:ident, $from_int:ident, $max_int:ident, $min_int:ident,
+        { $($more:tt)* }
     ) => {
-        impl_operator!($vector, Add, add, $add);
-        impl_operator!($vector, Sub, sub, $sub);
-        impl_operator!($vector, Mul, mul, $mul);
-        impl_operator!($vector, Div, div, $div);
-        impl_operator!($vector, BitAnd, bitand, $and);
-        impl_operator!($vector, BitOr, bitor, $or);
+        impl_operator!([$($generic)*] $vector, Add, add, $add);
+        impl_operator!([$($generic)*] $vector, Sub, sub, $sub);
+        impl_operator!([$($generic)*] $vector, Mul, mul, $mul);
+        impl_operator!([$($generic)*] $vector, Div, div, $div);
+        impl_operator!([$($generic)*] $vector, BitAnd, bitand, $and);
+        impl_operator!([$($generic)*] $vector, BitOr, bitor, $or);
 
-        // SAFETY of every block below: `Avx2::detect` saw the instructions, and only its token, or a
+        // SAFETY of every block below: the processor was seen to have the instructions, and only the token for that, or a
         // vector made through it, gets here. Loads and stores are of whole arrays, unaligned; but for `compress`, which
         // writes where its caller promises room for a vector.
         #[allow(clippy::undocumented_unsafe_blocks)]
-        impl Lanes for $vector {
-            type Token = Avx2;
+        impl<$($generic)*> Lanes for $vector {
+            type Token = $token;
             type Array = [f32; $n];
 
             #[inline(always)]
-            fn splat(_: Avx2, x: f32) -> Self {
+            fn splat(_: $token, x: f32) -> Self {
                 Self(unsafe { $splat(x) })
             }
             #[inline(always)]
@@ -117,19 +143,18 @@ macro_rules! impl_vector {
             }
             #[inline(always)]
             unsafe fn compress(self, mask: u32, to: *mut f32) {
-                let lanes = COMPRESSED[mask as usize % (1 << $n)];
-                unsafe { $store(to, $permute(self.0, lanes.first_chunk().unwrap_unchecked())) };
+                unsafe { $store(to, $compress(self.0, mask)) };
             }
         }
 
         #[allow(clippy::undocumented_unsafe_blocks)]
-        impl Vector<$n> for $vector {
+        impl<$($generic)*> Vector<$n> for $vector {
             #[inline(always)]
-            fn load(_: Avx2, lanes: &[f32; $n]) -> Self {
+            fn load(_: $token, lanes: &[f32; $n]) -> Self {
                 Self(unsafe { $load(lanes.as_ptr()) })
             }
             #[inline(always)]
-            fn of_bytes(_: Avx2, bytes: &[u8; $n]) -> Self {
+            fn of_bytes(_: $token, bytes: &[u8; $n]) -> Self {
                 Self(unsafe { $of_bytes(bytes) })
             }
             #[inline(always)]
@@ -173,23 +198,23 @@ macro_rules! impl_vector {
                 Self(unsafe { $blend(no.0, yes.0, self.0) })
             }
             #[inline(always)]
-            fn of_bits(_: Avx2, bits: u32) -> Self {
+            fn of_bits(_: $token, bits: u32) -> Self {
                 Self(unsafe { $of_bits(bits) })
-            }
-            #[inline(always)]
-            fn links(_: Avx2, ends: &[u8; $n], base: u32, stride: u32, first: u32) -> Self {
-                Self(unsafe { $links(ends, base, stride, first) })
             }
             #[inline(always)]
             fn permute(self, lanes: &[u8; $n]) -> Self {
                 Self(unsafe { $permute(self.0, lanes) })
             }
+            $($more)*
         }
     };
 }
+pub(super) use {impl_operator, impl_vector};
 
 impl_vector!(
-    F32x4,
+    [const AVX512: bool]
+    F32x4<AVX512>,
+    X86<AVX512>,
     4,
     _mm_set1_ps,
     _mm_loadu_ps,
@@ -209,17 +234,26 @@ impl_vector!(
     _mm_movemask_ps,
     permute4,
     least4,
+    compress4,
     of_bits4,
     of_bytes4,
-    links4,
     _mm_castps_si128,
     _mm_castsi128_ps,
     _mm_max_epi32,
-    _mm_min_epi32
+    _mm_min_epi32,
+    {
+        #[inline(always)]
+        fn links(_: X86<AVX512>, ends: &[u8; 4], base: u32, stride: u32, first: u32) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { links4(ends, base, stride, first) })
+        }
+    }
 );
 
 impl_vector!(
-    F32x8,
+    [const AVX512: bool]
+    F32x8<AVX512>,
+    X86<AVX512>,
     8,
     _mm256_set1_ps,
     _mm256_loadu_ps,
@@ -239,13 +273,25 @@ impl_vector!(
     _mm256_movemask_ps,
     permute8,
     least8,
+    compress8,
     of_bits8,
     of_bytes8,
-    links8,
     _mm256_castps_si256,
     _mm256_castsi256_ps,
     _mm256_max_epi32,
-    _mm256_min_epi32
+    _mm256_min_epi32,
+    {
+        #[inline(always)]
+        fn links(_: X86<AVX512>, ends: &[u8; 8], base: u32, stride: u32, first: u32) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { links8(ends, base, stride, first) })
+        }
+
+        #[inline(always)]
+        fn columns(token: X86<AVX512>, rows: [&[f32; 8]; 8]) -> [Self; 8] {
+            token.transpose(load_all(token, rows))
+        }
+    }
 );
 
 /// For a mask of lanes, their numbers in order.
@@ -268,7 +314,7 @@ const COMPRESSED: &[[u8; 8]; 256] = &{
     table
 };
 
-// SAFETY of what follows: called with vectors of this module alone, which exist only where an `Avx2` token was given.
+// SAFETY of what follows: called with vectors of this module alone, which exist only where an [`X86`] token was given.
 
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -282,6 +328,19 @@ fn permute4(vector: __m128, lanes: &[u8; 4]) -> __m128 {
 fn permute8(vector: __m256, lanes: &[u8; 8]) -> __m256 {
     let lanes = _mm_cvtsi64_si128(i64::from_le_bytes(*lanes));
     _mm256_permutevar8x32_ps(vector, _mm256_cvtepu8_epi32(lanes))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn compress4(vector: __m128, mask: u32) -> __m128 {
+    let [a, b, c, d, ..] = COMPRESSED[mask as usize % 16];
+    permute4(vector, &[a, b, c, d])
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn compress8(vector: __m256, mask: u32) -> __m256 {
+    permute8(vector, &COMPRESSED[mask as usize % 256])
 }
 
 #[inline]
@@ -393,7 +452,7 @@ fn least_key(keys: __m128i) -> usize {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn coordinates(points: [&[f32; 3]; 4]) -> [F32x4; 3] {
+fn coordinates<const AVX512: bool>(points: [&[f32; 3]; 4]) -> [F32x4<AVX512>; 3] {
     let [a, b, c, d] = points;
     // By twos and ones: a masked load of three is many times as slow on the first Zens.
     // SAFETY: two floats, then the third, of each.
@@ -414,7 +473,7 @@ fn coordinates(points: [&[f32; 3]; 4]) -> [F32x4; 3] {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn transpose(rows: [F32x8; 8]) -> [F32x8; 8] {
+fn transpose<const AVX512: bool>(rows: [F32x8<AVX512>; 8]) -> [F32x8<AVX512>; 8] {
     let [
         F32x8(r0),
         F32x8(r1),

@@ -2,7 +2,7 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::{Avx2, Avx512};
-use super::{Portable, Simd};
+use super::{Portable, Simd, Vector};
 use core::fmt;
 
 /// A set of instructions that this processor has.
@@ -27,6 +27,14 @@ pub trait Operation {
     type Output;
     /// Does it. To be marked `#[inline(always)]`, or the backend's instructions do not reach it.
     fn run<S: Simd>(self, token: S) -> Self::Output;
+}
+
+/// Something to be done with packets of rays, one a lane, however many lanes there are.
+pub trait PacketOperation {
+    /// What comes of it.
+    type Output;
+    /// Does it. To be marked `#[inline(always)]`, as [`Operation::run`] is.
+    fn run<const N: usize, V: Vector<N>>(self, token: V::Token) -> Self::Output;
 }
 
 impl Backend {
@@ -102,7 +110,7 @@ fn run_avx2<O: Operation>(operation: O, token: Avx2) -> O::Output {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
 fn run_avx512<O: Operation>(operation: O, token: Avx512) -> O::Output {
-    operation.run(token.vectors())
+    operation.run(token)
 }
 
 impl Default for Backend {

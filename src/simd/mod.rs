@@ -21,7 +21,7 @@ pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx512::Avx512;
 pub use backend::Backend;
-pub(crate) use backend::Operation;
+pub(crate) use backend::{Operation, PacketOperation};
 pub(crate) use one::F32x1;
 pub(crate) use portable::Portable;
 pub(crate) use vector::{

@@ -1,6 +1,6 @@
 //! Every operation that decides a hit, on every backend of this machine, held to plain floats, bit for bit.
 
-use super::{Backend, F32x1, Operation, Portable, Simd, Vector};
+use super::{Backend, F32x1, Operation, PacketOperation, Portable, Simd, Vector};
 use core::hint::black_box;
 use fastrand::Rng;
 
@@ -128,6 +128,12 @@ fn check<const N: usize, V: Vector<N>>(token: V::Token) {
         assert_same(x.replace(token, lane, b[0]).to_array(), replaced);
         assert_same(V::splat(token, a[0]).to_array(), [a[0]; N]);
 
+        let rows = [(); N].map(|()| [(); 8].map(|()| number(&mut rng)));
+        let columns = V::columns(token, rows.each_ref());
+        for (column, found) in columns.into_iter().enumerate() {
+            assert_same(found.to_array(), rows.map(|row| row[column]));
+        }
+
         let mut kept = [0.0; N];
         // SAFETY: as many places as lanes.
         unsafe { x.compress(bits, kept.as_mut_ptr()) };
@@ -148,6 +154,15 @@ impl Operation for Check {
     fn run<S: Simd>(self, token: S) {
         check::<4, S::F32x4>(token);
         check::<8, S::F32x8>(token);
+        token.in_packets(self);
+    }
+}
+
+impl PacketOperation for Check {
+    type Output = ();
+
+    fn run<const N: usize, V: Vector<N>>(self, token: V::Token) {
+        check::<N, V>(token);
     }
 }
 

@@ -5,6 +5,7 @@
 //! `permute`, `replace`) give the same bits on every backend. `mul_add`, `min` and `max` may differ in rounding,
 //! NaN and the sign of zero; the box test uses them, and is conservative.
 
+use super::PacketOperation;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 /// [`Simd::prefetch`] fetches nothing as many bytes after its address, or more.
@@ -26,16 +27,27 @@ pub trait Simd: Copy {
     /// Whether rays that go their own ways are faster interleaved than one after the other.
     const INTERLEAVES: bool;
 
+    /// Does `operation` with the vectors that packets of rays are fastest in.
+    #[inline(always)]
+    fn in_packets<O: PacketOperation>(self, operation: O) -> O::Output {
+        operation.run::<8, Self::F32x8>(self)
+    }
+
     /// Eight rows of eight as columns.
     #[inline(always)]
     fn transpose(self, rows: [Self::F32x8; 8]) -> [Self::F32x8; 8] {
-        let mut columns = [[0.0; 8]; 8];
-        for (lane, row) in rows.into_iter().enumerate() {
-            for (column, number) in columns.iter_mut().zip(row.to_array()) {
-                column[lane] = number;
-            }
-        }
-        load_all(self, columns.each_ref())
+        let [a, b, c, d, e, f, g, h] = rows;
+        let rows = [
+            a.to_array(),
+            b.to_array(),
+            c.to_array(),
+            d.to_array(),
+            e.to_array(),
+            f.to_array(),
+            g.to_array(),
+            h.to_array(),
+        ];
+        Self::F32x8::columns(self, rows.each_ref())
     }
 
     /// In lane `i` lane `lanes[i]` modulo 8.
@@ -107,7 +119,28 @@ pub trait Vector<const N: usize>:
 {
     /// One lane from each element.
     fn load(token: Self::Token, lanes: &[f32; N]) -> Self;
-    /// The same from integers.
+    /// Eight vectors: the first of the first number of each row, and so on.
+    #[inline(always)]
+    fn columns(token: Self::Token, rows: [&[f32; 8]; N]) -> [Self; 8] {
+        let mut columns = [[0.0; N]; 8];
+        for (lane, row) in rows.into_iter().enumerate() {
+            for (column, &number) in columns.iter_mut().zip(row) {
+                column[lane] = number;
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = &columns;
+        [
+            Self::load(token, a),
+            Self::load(token, b),
+            Self::load(token, c),
+            Self::load(token, d),
+            Self::load(token, e),
+            Self::load(token, f),
+            Self::load(token, g),
+            Self::load(token, h),
+        ]
+    }
+    /// One lane from each integer.
     #[inline(always)]
     fn of_bytes(token: Self::Token, bytes: &[u8; N]) -> Self {
         let mut lanes = [0.0; N];
@@ -148,12 +181,12 @@ pub trait Vector<const N: usize>:
     #[inline(always)]
     fn replace(self, token: Self::Token, lane: usize, x: f32) -> Self {
         // All bits of one lane. A load and a blend: to write a lane of an array and load the array would stall.
-        static ONE_LANE: [f32; 15] = {
-            let mut lanes = [0.0; 15];
-            lanes[7] = f32::from_bits(u32::MAX);
+        static ONE_LANE: [f32; 31] = {
+            let mut lanes = [0.0; 31];
+            lanes[15] = f32::from_bits(u32::MAX);
             lanes
         };
-        let start = 7 - lane % N;
+        let start = 15 - lane % N;
         let mask: &[f32; N] = ONE_LANE[start..start + N].try_into().unwrap_or(&[0.0; N]);
         Self::load(token, mask).select(Self::splat(token, x), self)
     }

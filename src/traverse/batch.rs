@@ -53,7 +53,7 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// the tree side by side; others are interleaved, where the [backend](crate::simd::Backend) is faster so (AVX2 and AVX-512), and
 /// else traced one after the other. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes 105 KiB of stack, where this crate is optimised.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes up to 120 KiB of stack, where this crate is optimised.
     ///
     /// ```
     /// # use wide_bvh::{Builder, Ray, TriangleMesh};
@@ -74,7 +74,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes 105 KiB of stack, where this crate is optimised.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 120 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
@@ -314,13 +314,13 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Op
             }
         }
         let (rays, mut found) = (&rays[..count], [Q::MISS; RAYS]);
-        let outcome = bundle::trace::<T, N, L, S, Q>(
-            token,
-            self.bvh,
-            rays,
-            &mut found[..count],
-            &mut Tightness::default(),
-        );
+        let out = &mut found[..count];
+        let outcome = if RAYS <= 8 {
+            bundle::trace_eight::<T, N, L, S, Q>(token, self.bvh, rays, out)
+        } else {
+            let before = &mut Tightness::default();
+            bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, out, before)
+        };
         if !outcome.is_traced() {
             for (ray, answer) in rays.iter().zip(&mut found) {
                 *answer = Q::one(self.bvh, ray);

@@ -5,8 +5,8 @@
 
 use super::{
     bundle::{self, Outcome, Tightness},
-    eight::Eight,
     query::Query,
+    ray_lanes::RayLanes,
 };
 use crate::{
     geometry::Ray,
@@ -155,7 +155,7 @@ impl Classes {
         let mut bits = [0; 5];
         for (index, rays) in rays.chunks(8).enumerate() {
             let eight = array::from_fn(|lane| rays.get(lane).unwrap_or(&PreparedRay::ROOM));
-            let [x, y, z] = Eight::new(token, eight).direction;
+            let [x, y, z] = RayLanes::<T::F32x8>::new(token, eight).direction;
             let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
             let largest = [ay.le(ax) & az.le(ax), ax.lt(ay) & az.le(ay)];
             let of_eight = [

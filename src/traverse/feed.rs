@@ -3,7 +3,7 @@
 //! Rays are made ready eight at a time, a ray a lane of vectors, which is much less work than one by one. Those that are
 //! out of the ordinary, because they hit nothing, have to be scaled or are too far away, are answered at once.
 
-use super::{eight::Eight, query::Query, triangles::Found};
+use super::{query::Query, ray_lanes::RayLanes, triangles::Found};
 use crate::{
     geometry::Ray,
     layout::{Bvh, Storage, TriangleLeaves, WideNode},
@@ -126,11 +126,11 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation
             if count == 0 {
                 return;
             }
-            let Eight {
+            let RayLanes {
                 origin,
                 direction,
                 range,
-            } = Eight::new(token, rays.each_ref());
+            } = RayLanes::<T::F32x8>::new(token, rays.each_ref());
             let bounds = feed.bvh.bounds();
             let ready = &mut feed.ready;
             let ordinary =

@@ -2,13 +2,13 @@
 //! that are scattered over packets are put into new ones.
 
 use super::{
-    Bundle, LANES, first_packet, packets_of,
-    shears::{Asked, Shears, V},
+    Bundle, first_packet, packet_mask, packets_of,
+    shears::{Asked, Shears},
 };
 use crate::{
     layout::{Gather, Gathered, Triangles},
     primitive::triangle::bits,
-    simd::{Lanes, Simd, Vector},
+    simd::Vector,
     slab::{PreparedRay, most},
     traverse::query::Query,
 };
@@ -19,19 +19,19 @@ const FEW_AT_LEAF: u32 = 3;
 /// No more rays than this of a packet there are tested one by one, against its triangles brought together.
 const FEW_IN_PACKET: u32 = 2;
 
-impl<'a, T: Simd> Bundle<'a, T> {
+impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
     /// Tests the leaf's triangles for some of the rays.
     #[inline(always)]
     pub(super) fn test_leaf<Q: Query>(
         &mut self,
-        token: T,
+        token: V::Token,
         leaf: impl Gather,
         primitives: &[u32],
         rays: u64,
     ) {
         if rays.count_ones() <= FEW_AT_LEAF {
             let (mut new, mut left) = (0, rays);
-            while let Some(index) = first_packet(&mut left) {
+            while let Some(index) = first_packet::<LANES>(&mut left) {
                 let asked = self.asked(index, rays);
                 let packet = self.packet(index);
                 let of_packet = packet.test_by_ray::<Q>(token, leaf, primitives, asked);
@@ -39,7 +39,8 @@ impl<'a, T: Simd> Bundle<'a, T> {
             }
             return self.note::<Q>(token, new);
         }
-        let scattered = !Q::CLOSEST && packets_of(rays) > rays.count_ones().div_ceil(LANES as u32);
+        let scattered =
+            !Q::CLOSEST && packets_of::<LANES>(rays) > rays.count_ones().div_ceil(LANES as u32);
         let (mut from, mut room) = (0, MaybeUninit::uninit());
         while from < leaf.count() {
             let triangles = leaf.gather(from, &mut room);
@@ -58,13 +59,13 @@ impl<'a, T: Simd> Bundle<'a, T> {
     #[inline(always)]
     fn test_by_packet<Q: Query>(
         &mut self,
-        token: T,
+        token: V::Token,
         triangles: impl Gathered,
         primitives: &[u32],
         rays: u64,
     ) -> u64 {
         let (mut new, mut left) = (0, rays);
-        while let Some(index) = first_packet(&mut left) {
+        while let Some(index) = first_packet::<LANES>(&mut left) {
             let asked = self.asked(index, rays);
             let packet = self.packet(index);
             let of_packet = if asked.lanes.count_ones() <= FEW_IN_PACKET {
@@ -77,12 +78,12 @@ impl<'a, T: Simd> Bundle<'a, T> {
         new
     }
 
-    /// The same for rays that are spread over more packets than they would fill: eight at a time, whatever packets they are of.
+    /// The same for rays that are spread over more packets than they would fill: as many at a time as fill one, whatever packets they are of.
     /// Whether there is a hit is all that is found out.
     #[inline(always)]
     fn test_scattered<Q: Query>(
         &self,
-        token: T,
+        token: V::Token,
         triangles: impl Gathered,
         primitives: &[u32],
         rays: u64,
@@ -107,7 +108,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 numbers: &numbers,
                 axes: self.axes,
             };
-            let mut shears = Shears::of(token, group, *self.axes);
+            let mut shears = Shears::<LANES, V>::of(token, group, *self.axes);
             for lane in bits(shears.test::<Q, _>(token, triangles, primitives, asked)) {
                 new |= 1 << numbers[lane % LANES];
             }
@@ -117,29 +118,40 @@ impl<'a, T: Simd> Bundle<'a, T> {
 
     /// What a packet is asked of some of the rays.
     #[inline(always)]
-    fn asked(&self, index: usize, rays: u64) -> Asked<'a> {
+    fn asked(&self, index: usize, rays: u64) -> Asked<'a, LANES> {
         let first = LANES * index;
+        let of_packet = |rays: u64| (rays >> first & packet_mask::<LANES>()) as u32;
         Asked {
-            lanes: u32::from((rays >> first) as u8),
-            found: u32::from((self.found >> first) as u8),
+            lanes: of_packet(rays),
+            found: of_packet(self.found),
             rays: &self.rays[first..],
-            numbers: &[0, 1, 2, 3, 4, 5, 6, 7],
+            numbers: const { &in_order() },
             axes: self.axes,
         }
     }
 
     /// Takes note of rays that have a new best hit, and how far the others still look.
     #[inline(always)]
-    fn note<Q: Query>(&mut self, token: T, new: u64) {
+    fn note<Q: Query>(&mut self, token: V::Token, new: u64) {
         self.found |= new;
         if !Q::CLOSEST {
             self.looking &= !new;
         } else if new != 0 {
-            let mut far = V::<T>::splat(token, f32::NEG_INFINITY);
+            let mut far = V::splat(token, f32::NEG_INFINITY);
             for index in 0..self.count {
                 far = far.max(self.packet(index).far);
             }
             self.far = most(far);
         }
     }
+}
+
+/// Each lane's own number.
+const fn in_order<const LANES: usize>() -> [u8; LANES] {
+    let (mut numbers, mut lane) = ([0; LANES], 0);
+    while lane < LANES {
+        numbers[lane] = lane as u8;
+        lane += 1;
+    }
+    numbers
 }

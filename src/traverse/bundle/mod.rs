@@ -1,9 +1,9 @@
 //! Rays of about one origin and one direction, side by side through the tree.
 //!
-//! A node is tested once for all of them, by intervals; a child that any of them may meet is tested again for each, eight
-//! rays at a time, unless the intervals say that all pass; and so are the triangles of a leaf that is left. Where few are left,
-//! each is tested by itself, against all children at once. The camera's rays, and shadow rays towards one light, share most of
-//! their way.
+//! A node is tested once for all of them, by intervals; a child that any of them may meet is tested again for each, eight or
+//! sixteen rays at a time, unless the intervals say that all pass; and so are the triangles of a leaf that is left. Where few
+//! are left, each is tested by itself, against all children at once. The camera's rays, and shadow rays towards one light,
+//! share most of their way.
 //!
 //! After Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm" (2005), and Overbeck, Ramamoorthi, Mark, "Large ray
 //! packets for real-time Whitted ray tracing" (2008): the rays that a node is for are kept as a mask. One by one: Barringer and
@@ -19,7 +19,6 @@ pub(super) use self::tightness::Tightness;
 
 use self::{
     packet::Packet,
-    shears::V,
     ways::{Entry, Ways, insert},
 };
 use super::{query::Query, triangles::Found};
@@ -27,7 +26,7 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, WideNode},
     primitive::triangle::bits,
-    simd::{Lanes, Simd, Vector, splat3},
+    simd::{Lanes, PacketOperation, Simd, Vector, splat3},
     slab::{
         BundlePasses, BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, least, most, passing,
     },
@@ -37,9 +36,8 @@ use glam::Vec3;
 
 /// The most rays of a bundle: a bit each.
 pub(super) const RAYS: usize = 64;
-/// Rays tested at a time.
-const LANES: usize = 8;
-const PACKETS: usize = RAYS / LANES;
+/// The most packets: no less than eight rays are tested at a time.
+const PACKETS: usize = RAYS / 8;
 /// No more rays than this at a node are tested one by one, against all children at once.
 const FEW_AT_NODE: u32 = 12;
 /// The same of a bundle that is one packet: all of it takes hardly more than one of its rays.
@@ -53,12 +51,12 @@ const TRIED: usize = 1;
 const DONE: usize = 4;
 
 /// Rays under way.
-struct Bundle<'a, T: Simd> {
+struct Bundle<'a, const LANES: usize, V> {
     rays: &'a [Ray],
     axes: &'static [usize; 3],
     slabs: BundleSlabs,
     /// Those below `count` were written. Lanes past the last ray repeat the first.
-    packets: [MaybeUninit<Packet<T>>; PACKETS],
+    packets: [MaybeUninit<Packet<LANES, V>>; PACKETS],
     count: usize,
     /// The greatest of the packets'.
     far: f32,
@@ -99,46 +97,94 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
     answers: &mut [Q::Answer],
     before: &mut Tightness,
 ) -> Outcome {
-    if bvh.root() == Child::EMPTY {
-        return Outcome::Unlike;
-    }
-    let Some(mut bundle) = Bundle::<T>::new(token, bvh.bounds(), rays) else {
-        return Outcome::Unlike;
+    token.in_packets(Trace::<N, L, S, Q> {
+        bvh,
+        rays,
+        answers,
+        before,
+    })
+}
+
+/// The same of no more than eight rays.
+#[inline(always)]
+pub(super) fn trace_eight<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+    token: T,
+    bvh: &Bvh<N, L, S>,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) -> Outcome {
+    let before = &mut Tightness::default();
+    let trace = Trace::<N, L, S, Q> {
+        bvh,
+        rays,
+        answers,
+        before,
     };
-    let traced = bundle.walk::<N, L, S, Q>(token, bvh);
-    *before = before.with(bundle.tightness);
-    if !traced {
-        return Outcome::GivenUp;
-    }
-    for (index, answers) in answers.chunks_mut(LANES).enumerate() {
-        let found = bundle.found >> (LANES * index);
-        let shears = &bundle.packet(index).shears;
-        let (t, u, v) = (
-            shears.t_max.to_array(),
-            shears.u.to_array(),
-            shears.v.to_array(),
-        );
-        let places = shears.places.to_array();
-        for (lane, answer) in answers.iter_mut().enumerate() {
-            let lane = lane % LANES;
-            *answer = if found >> lane & 1 == 0 {
-                Q::MISS
-            } else {
-                let found = Found {
-                    t: t[lane],
-                    u: u[lane],
-                    v: v[lane],
-                    place: places[lane].to_bits() as usize,
-                };
-                Q::answer(found, bvh.primitives())
-            };
+    trace.run::<8, T::F32x8>(token)
+}
+
+/// [`trace`].
+struct Trace<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
+    bvh: &'a Bvh<N, L, S>,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
+    before: &'a mut Tightness,
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> PacketOperation
+    for Trace<'_, N, L, S, Q>
+{
+    type Output = Outcome;
+
+    #[inline(always)]
+    fn run<const LANES: usize, V: Vector<LANES>>(self, token: V::Token) -> Outcome {
+        let Self {
+            bvh,
+            rays,
+            answers,
+            before,
+        } = self;
+        if bvh.root() == Child::EMPTY {
+            return Outcome::Unlike;
         }
-    }
-    // Where there are waves they are faster then.
-    if bundle.tightness.is_loose() || T::INTERLEAVES && before.is_loose_on_the_whole() {
-        Outcome::Loose
-    } else {
-        Outcome::Tight
+        let Some(mut bundle) = Bundle::<LANES, V>::new(token, bvh.bounds(), rays) else {
+            return Outcome::Unlike;
+        };
+        let traced = bundle.walk::<N, L, S, Q>(token, bvh);
+        *before = before.with(bundle.tightness);
+        if !traced {
+            return Outcome::GivenUp;
+        }
+        for (index, answers) in answers.chunks_mut(LANES).enumerate() {
+            let found = bundle.found >> (LANES * index);
+            let shears = &bundle.packet(index).shears;
+            let (t, u, v) = (
+                shears.t_max.to_array(),
+                shears.u.to_array(),
+                shears.v.to_array(),
+            );
+            let places = shears.places.to_array();
+            for (lane, answer) in answers.iter_mut().enumerate() {
+                let lane = lane % LANES;
+                *answer = if found >> lane & 1 == 0 {
+                    Q::MISS
+                } else {
+                    let found = Found {
+                        t: t[lane],
+                        u: u[lane],
+                        v: v[lane],
+                        place: places[lane].to_bits() as usize,
+                    };
+                    Q::answer(found, bvh.primitives())
+                };
+            }
+        }
+        // Where there are waves they are faster then.
+        if bundle.tightness.is_loose() || V::Token::INTERLEAVES && before.is_loose_on_the_whole() {
+            Outcome::Loose
+        } else {
+            Outcome::Tight
+        }
     }
 }
 
@@ -170,7 +216,7 @@ pub(super) fn count_boxes<T: Simd, N: WideNode>(
     if rays.len() > RAYS {
         return None;
     }
-    let bundle = Bundle::<T>::new(token, bounds, rays)?;
+    let bundle = Bundle::<8, T::F32x8>::new(token, bounds, rays)?;
     let far = N::Lanes::<T>::splat(token, bundle.far);
     let mut passed = 0;
     for node in nodes {
@@ -180,19 +226,20 @@ pub(super) fn count_boxes<T: Simd, N: WideNode>(
     Some(passed)
 }
 
-impl<'a, T: Simd> Bundle<'a, T> {
+impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
     /// `None` if the rays are not alike, or one of them is out of the ordinary, or all is too far away.
     #[inline(always)]
-    fn new(token: T, bounds: &Aabb, rays: &'a [Ray]) -> Option<Self> {
+    fn new(token: V::Token, bounds: &Aabb, rays: &'a [Ray]) -> Option<Self> {
+        const { assert!(RAYS / LANES <= PACKETS) };
         let first = rays.first()?;
         let mut room = PreparedRay::ROOM;
         let prepared = PreparedRay::new(first, &mut room)?;
         let axes = prepared.axes;
         let count = rays.len().div_ceil(LANES).min(PACKETS);
         let mut packets = [const { MaybeUninit::uninit() }; PACKETS];
-        let nothing = V::<T>::splat(token, f32::NEG_INFINITY);
+        let nothing = V::splat(token, f32::NEG_INFINITY);
         let (mut extent, mut far) = (nothing, nothing);
-        let mut start = V::<T>::splat(token, f32::INFINITY);
+        let mut start = V::splat(token, f32::INFINITY);
         // Of the slopes and the slopes' negatives.
         let mut steepest = [[nothing; 2]; 2];
         for index in 0..count {
@@ -201,7 +248,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
             extent = extent.max(extents);
             start = start.min(starts);
             far = far.max(packet.far);
-            let ([x, y], zero) = (packet.shears.slope, V::<T>::splat(token, 0.0));
+            let ([x, y], zero) = (packet.shears.slope, V::splat(token, 0.0));
             let [up, down] = &mut steepest;
             *up = [up[0].max(x), up[1].max(y)];
             *down = [down[0].max(zero - x), down[1].max(zero - y)];
@@ -232,7 +279,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     }
 
     #[inline(always)]
-    fn packet(&mut self, index: usize) -> &mut Packet<T> {
+    fn packet(&mut self, index: usize) -> &mut Packet<LANES, V> {
         debug_assert!(index < self.count);
         // SAFETY: callers' indices are below `count`, and those were written.
         unsafe { self.packets.get_unchecked_mut(index).assume_init_mut() }
@@ -242,7 +289,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     #[inline(always)]
     fn walk<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
-        token: T,
+        token: V::Token,
         bvh: &Bvh<N, L, S>,
     ) -> bool {
         let direction = self.rays[0].direction;
@@ -283,7 +330,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
                 }
                 // Those that have found something may look less far.
                 if entry.by_all && self.found & rays == 0 {
-                    let (tests, passes) = (packets_of(rays), rays.count_ones());
+                    let (tests, passes) = (packets_of::<LANES>(rays), rays.count_ones());
                     self.tightness.add(tests as usize, passes as usize);
                 } else {
                     // SAFETY: it was walked through.
@@ -305,7 +352,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     #[inline(always)]
     fn test_together<N: WideNode, L: TriangleLeaves, S: Storage>(
         &self,
-        token: T,
+        token: V::Token,
         bvh: &Bvh<N, L, S>,
         current: Link,
         rays: u64,
@@ -314,7 +361,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     ) {
         // SAFETY: the layout's check saw that all nodes led to are there.
         let node = unsafe { bvh.node(current) };
-        let far = N::Lanes::<T>::splat(token, self.far);
+        let far = N::Lanes::<V::Token>::splat(token, self.far);
         let BundlePasses { any, all, near } = node.test_bundle(token, &self.slabs, far);
         let near = near.to_array();
         let base = *len;
@@ -339,7 +386,7 @@ impl<'a, T: Simd> Bundle<'a, T> {
     #[inline(always)]
     fn test_one_by_one<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,
-        token: T,
+        token: V::Token,
         bvh: &Bvh<N, L, S>,
         current: Link,
         rays: u64,
@@ -350,13 +397,20 @@ impl<'a, T: Simd> Bundle<'a, T> {
         let node = unsafe { bvh.node(current) };
         // Of compact nodes worked out, and so once for all.
         let planes = node.planes(token, &self.slabs);
-        let mut halves = [Passing::<N::Lanes<T>>::none(token); 2];
+        let mut halves = [Passing::<N::Lanes<V::Token>>::none(token); 2];
         const { assert!(RAYS == 2 * passing::RAYS) };
         for (half, passing) in halves.iter_mut().enumerate() {
             let first = half * passing::RAYS;
             for ray in bits((rays >> first) as u32) {
                 let packet = self.packet((first + ray) / LANES);
-                N::test_one_of(&planes, token, &packet.slabs, &packet.far, ray, passing);
+                N::test_one_of::<LANES, V>(
+                    &planes,
+                    token,
+                    &packet.slabs,
+                    &packet.far,
+                    ray,
+                    passing,
+                );
             }
         }
         let mut children = node.present(halves[0].children() | halves[1].children());
@@ -390,11 +444,11 @@ impl<'a, T: Simd> Bundle<'a, T> {
 
     /// Which of the rays pass a box, given by the planes that they meet first and those they meet last.
     #[inline(always)]
-    fn passing(&mut self, token: T, near: [f32; 3], far: [f32; 3], rays: u64) -> u64 {
+    fn passing(&mut self, token: V::Token, near: [f32; 3], far: [f32; 3], rays: u64) -> u64 {
         let (near, far) = (splat3(token, near), splat3(token, far));
         let (mut passing, mut tests) = (0, 0);
         let mut left = rays;
-        while let Some(index) = first_packet(&mut left) {
+        while let Some(index) = first_packet::<LANES>(&mut left) {
             let packet = self.packet(index);
             let (hit, _) = packet.slabs.between(near, far, packet.far);
             tests += 1;
@@ -408,21 +462,30 @@ impl<'a, T: Simd> Bundle<'a, T> {
 
 /// How many packets have any of the rays.
 #[inline(always)]
-fn packets_of(rays: u64) -> u32 {
-    const { assert!(LANES == 8) };
+fn packets_of<const LANES: usize>(rays: u64) -> u32 {
     // Each packet's bits brought down to its lowest.
-    let pairs = rays | rays >> 4;
-    let ones = pairs | pairs >> 2;
-    ((ones | ones >> 1) & 0x0101_0101_0101_0101).count_ones()
+    let (mut ones, mut step) = (rays, LANES / 2);
+    while step > 0 {
+        ones |= ones >> step;
+        step /= 2;
+    }
+    (ones & (u64::MAX / packet_mask::<LANES>())).count_ones()
+}
+
+/// The rays of the first packet.
+#[inline(always)]
+const fn packet_mask<const LANES: usize>() -> u64 {
+    const { assert!(LANES.is_power_of_two() && LANES < RAYS) };
+    (1 << LANES) - 1
 }
 
 /// The first packet that has any of the rays. Takes its rays from them.
 #[inline(always)]
-fn first_packet(rays: &mut u64) -> Option<usize> {
+fn first_packet<const LANES: usize>(rays: &mut u64) -> Option<usize> {
     if *rays == 0 {
         return None;
     }
     let index = rays.trailing_zeros() as usize / LANES;
-    *rays &= !(0xff << (LANES * index));
+    *rays &= !(packet_mask::<LANES>() << (LANES * index));
     Some(index)
 }

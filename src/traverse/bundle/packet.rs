@@ -1,50 +1,47 @@
-//! Eight rays of a bundle, a lane each.
+//! Some rays of a bundle, a lane each.
 
-use super::{
-    LANES,
-    shears::{Asked, Shears, V},
-};
+use super::shears::{Asked, Shears};
 use crate::{
     geometry::{Aabb, Ray},
     layout::{Gathered, Triangles},
     primitive::triangle::{RayShear, bits},
-    simd::{Lanes, Simd, Vector},
+    simd::Vector,
     slab::{PreparedRay, RaySlabs, reach, reciprocals},
-    traverse::{eight::Eight, query::Query, triangles::Found},
+    traverse::{query::Query, ray_lanes::RayLanes, triangles::Found},
 };
 use core::array;
 
-/// Eight rays.
-pub(super) struct Packet<T: Simd> {
-    pub(super) slabs: RaySlabs<LANES, V<T>>,
+/// Rays side by side.
+pub(super) struct Packet<const LANES: usize, V> {
+    pub(super) slabs: RaySlabs<LANES, V>,
     /// Up to which `t` boxes are of interest: `t_max` and the margin.
-    pub(super) far: V<T>,
-    pub(super) shears: Shears<T>,
+    pub(super) far: V,
+    pub(super) shears: Shears<LANES, V>,
 }
 
-impl<T: Simd> Packet<T> {
-    /// Of the first eight rays, or as many as there are, if they are like the one that is prepared; each one's D, and before
+impl<const LANES: usize, V: Vector<LANES>> Packet<LANES, V> {
+    /// Of the first rays, as many as there are or fill it, if they are like the one that is prepared; each one's D, and before
     /// which `t` it hits nothing.
     #[inline(always)]
     pub(super) fn new(
-        token: T,
+        token: V::Token,
         bounds: &Aabb,
         rays: &[Ray],
         like: &PreparedRay,
-    ) -> Option<(Self, V<T>, V<T>)> {
+    ) -> Option<(Self, V, V)> {
         let padded: [Ray; LANES];
-        let eight = match rays.first_chunk() {
-            Some(eight) => eight,
+        let rays = match rays.first_chunk() {
+            Some(rays) => rays,
             None => {
                 padded = array::from_fn(|lane| *rays.get(lane).unwrap_or(like.ray));
                 &padded
             }
         };
-        let Eight {
+        let RayLanes {
             origin,
             direction,
             range,
-        } = Eight::new(token, eight.each_ref());
+        } = RayLanes::new(token, rays.each_ref());
         let [t_min, t_max] = range;
         if !like.is_like(token, origin, direction, range) {
             return None;
@@ -67,10 +64,10 @@ impl<T: Simd> Packet<T> {
     #[inline(always)]
     pub(super) fn test_leaf<Q: Query, G: Gathered>(
         &mut self,
-        token: T,
+        token: V::Token,
         triangles: G,
         primitives: &[u32],
-        asked: Asked,
+        asked: Asked<LANES>,
     ) -> u32 {
         let new = self
             .shears
@@ -83,10 +80,10 @@ impl<T: Simd> Packet<T> {
     #[inline(always)]
     pub(super) fn test_by_ray<Q: Query>(
         &mut self,
-        token: T,
+        token: V::Token,
         triangles: impl Triangles,
         primitives: &[u32],
-        asked: Asked,
+        asked: Asked<LANES>,
     ) -> u32 {
         let Asked {
             lanes,
@@ -134,7 +131,7 @@ impl<T: Simd> Packet<T> {
 
     /// Up to which `t` boxes are of interest now.
     #[inline(always)]
-    fn reach(&self, token: T) -> V<T> {
+    fn reach(&self, token: V::Token) -> V {
         reach(token, self.shears.t_max, self.slabs.margins())
     }
 }

@@ -1,6 +1,5 @@
-//! Eight rays as triangles see them, a lane each.
+//! Rays as triangles see them, a lane each.
 
-use super::LANES;
 use crate::{
     geometry::Ray,
     layout::{Gathered, Triangles},
@@ -8,17 +7,14 @@ use crate::{
         exact::{Pair, Pairs},
         triangle::{Along, Edges, Sheared, Where, Whether, bits},
     },
-    simd::{Lanes, Simd, Vector, splat3},
+    simd::{Vector, splat3},
     slab::{PreparedRay, reciprocal},
-    traverse::{eight::Eight, query::Query},
+    traverse::{query::Query, ray_lanes::RayLanes},
 };
-
-/// A number of each ray of a packet.
-pub(super) type V<T> = <T as Simd>::F32x8;
 
 /// Which of a packet's rays are asked for triangles.
 #[derive(Clone, Copy)]
-pub(super) struct Asked<'a> {
+pub(super) struct Asked<'a, const LANES: usize> {
     /// A bit each.
     pub(super) lanes: u32,
     /// The lanes that have found something.
@@ -31,27 +27,27 @@ pub(super) struct Asked<'a> {
     pub(super) axes: &'static [usize; 3],
 }
 
-/// What the triangle test needs of eight rays, and what it has found.
-pub(super) struct Shears<T: Simd> {
-    pub(super) origin: [V<T>; 3],
-    pub(super) slope: [V<T>; 2],
-    pub(super) along: Along<V<T>>,
+/// What the triangle test needs of the rays, and what it has found.
+pub(super) struct Shears<const LANES: usize, V> {
+    pub(super) origin: [V; 3],
+    pub(super) slope: [V; 2],
+    pub(super) along: Along<V>,
     /// The best hits so far, in the lanes that have one.
-    pub(super) t_max: V<T>,
-    pub(super) u: V<T>,
-    pub(super) v: V<T>,
+    pub(super) t_max: V,
+    pub(super) u: V,
+    pub(super) v: V,
     /// Their places in the list of primitive numbers, as bits.
-    pub(super) places: V<T>,
+    pub(super) places: V,
 }
 
-impl<T: Simd> Shears<T> {
+impl<const LANES: usize, V: Vector<LANES>> Shears<LANES, V> {
     /// Of rays that have found nothing so far. `reciprocal` is of the direction along the last of the axes of the shear.
     #[inline(always)]
     pub(super) fn new(
-        origin: [V<T>; 3],
-        direction: [V<T>; 3],
-        [t_min, t_max]: [V<T>; 2],
-        reciprocal: V<T>,
+        origin: [V; 3],
+        direction: [V; 3],
+        [t_min, t_max]: [V; 2],
+        reciprocal: V,
         [kx, ky, _]: [usize; 3],
     ) -> Self {
         Self {
@@ -68,12 +64,12 @@ impl<T: Simd> Shears<T> {
 
     /// The same of prepared rays, each as its caller gave it.
     #[inline(always)]
-    pub(super) fn of(token: T, rays: [&Ray; LANES], axes: [usize; 3]) -> Self {
-        let Eight {
+    pub(super) fn of(token: V::Token, rays: [&Ray; LANES], axes: [usize; 3]) -> Self {
+        let RayLanes {
             origin,
             direction,
             range,
-        } = Eight::new(token, rays);
+        } = RayLanes::new(token, rays);
         let along = reciprocal(token, direction[axes[2]]);
         Self::new(origin, direction, range, along, axes)
     }
@@ -82,10 +78,10 @@ impl<T: Simd> Shears<T> {
     #[inline(always)]
     pub(super) fn test<Q: Query, G: Gathered>(
         &mut self,
-        token: T,
+        token: V::Token,
         triangles: G,
         primitives: &[u32],
-        asked: Asked,
+        asked: Asked<LANES>,
     ) -> u32 {
         let Asked {
             mut lanes,
@@ -99,7 +95,7 @@ impl<T: Simd> Shears<T> {
         // SAFETY: a prepared ray's axes, a permutation of 0 to 2.
         unsafe { core::hint::assert_unchecked(kx < 3 && ky < 3 && kz < 3) };
         let origin = [self.origin[kx], self.origin[ky], self.origin[kz]];
-        let nowhere = [V::<T>::splat(token, 0.0); 3];
+        let nowhere = [V::splat(token, 0.0); 3];
         let mut vertices = [Sheared::new(nowhere, nowhere, [nowhere[0]; 2]); 8];
         let [x, y, z] = [&leaf.vertices[kx], &leaf.vertices[ky], &leaf.vertices[kz]];
         for vertex in 0..8 {
@@ -152,11 +148,11 @@ impl<T: Simd> Shears<T> {
                 let best = self.places.to_array()[lane % LANES].to_bits() as usize;
                 closer |= u32::from(primitives[place] < primitives[best]) << lane;
             }
-            let set = V::<T>::of_bits(token, closer);
+            let set = V::of_bits(token, closer);
             self.t_max = set.select(hits.t, self.t_max);
             self.u = set.select(hits.u, self.u);
             self.v = set.select(hits.v, self.v);
-            let places = V::<T>::splat(token, f32::from_bits(place as u32));
+            let places = V::splat(token, f32::from_bits(place as u32));
             self.places = set.select(places, self.places);
             found |= closer;
             new |= closer;
@@ -167,7 +163,7 @@ impl<T: Simd> Shears<T> {
 
 /// The rays of a packet against one triangle of a leaf.
 #[derive(Clone, Copy)]
-struct OneTriangle<'a, R> {
+struct OneTriangle<'a, const LANES: usize, R> {
     triangles: R,
     triangle: usize,
     rays: &'a [Ray],
@@ -175,7 +171,7 @@ struct OneTriangle<'a, R> {
     axes: &'static [usize; 3],
 }
 
-impl<R: Triangles> Pairs for OneTriangle<'_, R> {
+impl<const LANES: usize, R: Triangles> Pairs for OneTriangle<'_, LANES, R> {
     #[inline(always)]
     fn pair(&self, lane: usize) -> Pair {
         // Lanes past the last ray are not among those that are asked for.

@@ -1,7 +1,7 @@
 //! How far the rays of bundles keep together.
 
-/// A bundle is loose if fewer rays, in eighths, pass a box for each test of a packet: of the eight that are tested at once
-/// hardly one goes on.
+/// A bundle is loose if fewer rays, in eighths, pass a box for each test of a packet: of the eight or sixteen that are tested
+/// at once hardly one goes on.
 const LEAST_PASSES: usize = 9;
 /// Bundles on the whole are, if fewer do.
 const LEAST_PASSES_ON_THE_WHOLE: usize = 14;
