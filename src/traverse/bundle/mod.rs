@@ -331,7 +331,7 @@ impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
                 // Those that have found something may look less far.
                 if entry.by_all && self.found & rays == 0 {
                     let (tests, passes) = (packets_of::<LANES>(rays), rays.count_ones());
-                    self.tightness.add(tests as usize, passes as usize);
+                    self.tightness.add::<LANES>(tests, passes);
                 } else {
                     // SAFETY: it was walked through.
                     let parent = unsafe { bvh.node(entry.parent) };
@@ -455,7 +455,7 @@ impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
             passing |= u64::from(hit.bits()) << (LANES * index);
         }
         passing &= rays;
-        self.tightness.add(tests, passing.count_ones() as usize);
+        self.tightness.add::<LANES>(tests, passing.count_ones());
         passing
     }
 }
