@@ -54,6 +54,7 @@ impl<const AVX512: bool> Simd for X86<AVX512> {
     #[inline(always)]
     fn in_packets<O: PacketOperation>(self, operation: O) -> O::Output {
         if AVX512 {
+            // Of this very type: it stands for the same.
             operation.run::<16, avx512::F32x16>(X86(()))
         } else {
             operation.run::<8, Self::F32x8>(self)
