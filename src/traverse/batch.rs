@@ -53,7 +53,7 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// the tree side by side; others are interleaved, where the [backend](crate::simd::Backend) is faster so (AVX2 and AVX-512), and
 /// else traced one after the other. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes up to 120 KiB of stack, where this crate is optimised.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes up to 90 KiB of stack, where this crate is optimised.
     ///
     /// ```
     /// # use wide_bvh::{Builder, Ray, TriangleMesh};
@@ -74,7 +74,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 120 KiB of stack, where this crate is optimised.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 90 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
@@ -202,7 +202,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'
                 *waiting =
                     classes::trace::<T, N, L, S, Q>(token, bvh, rays, answers, &mut patience);
             }
-            // By a call: what bundles need of registers is not taken from waves.
+            // By a call, as bundles are: what those need of registers is not taken from waves.
             bvh.backend().call(Rest::<N, L, S, Q> {
                 bvh,
                 rays,
@@ -319,7 +319,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query, const RAYS: usize> Op
             bundle::trace_eight::<T, N, L, S, Q>(token, self.bvh, rays, out)
         } else {
             let before = &mut Tightness::default();
-            bundle::trace::<T, N, L, S, Q>(token, self.bvh, rays, out, before)
+            bundle::trace::<N, L, S, Q>(self.bvh, rays, out, before)
         };
         if !outcome.is_traced() {
             for (ray, answer) in rays.iter().zip(&mut found) {

@@ -97,8 +97,7 @@ pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Quer
             }
             (&gathered[..count], &mut found[..count])
         };
-        let outcome =
-            bundle::trace::<T, N, L, S, Q>(token, bvh, part, out, &mut patience.tightness);
+        let outcome = bundle::trace::<N, L, S, Q>(bvh, part, out, &mut patience.tightness);
         let (alike, tight) = (outcome != Outcome::Unlike, outcome == Outcome::Tight);
         if whole {
             if alike {

@@ -26,7 +26,7 @@ use crate::{
     geometry::{Aabb, Ray},
     layout::{Bvh, Child, Link, STACK, Storage, TriangleLeaves, WideNode},
     primitive::triangle::bits,
-    simd::{Lanes, PacketOperation, Simd, Vector, splat3},
+    simd::{Lanes, Operation, PacketOperation, Simd, Vector, splat3},
     slab::{
         BundlePasses, BundleSlabs, Bundling, MAX_EXTENT, Passing, PreparedRay, least, most, passing,
     },
@@ -90,14 +90,14 @@ impl Outcome {
 /// Traces rays, no more than [`RAYS`], of which there are as many as answers, if they are alike. `before` is of the bundles
 /// traced before, and then of this one, too.
 #[inline(always)]
-pub(super) fn trace<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
-    token: T,
+pub(super) fn trace<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
     bvh: &Bvh<N, L, S>,
     rays: &[Ray],
     answers: &mut [Q::Answer],
     before: &mut Tightness,
 ) -> Outcome {
-    token.in_packets(Trace::<N, L, S, Q> {
+    // By a call: the stack that it takes is given back before waves take theirs.
+    bvh.backend().call(Trace::<N, L, S, Q> {
         bvh,
         rays,
         answers,
@@ -120,7 +120,7 @@ pub(super) fn trace_eight<T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q
         answers,
         before,
     };
-    trace.run::<8, T::F32x8>(token)
+    PacketOperation::run::<8, T::F32x8>(trace, token)
 }
 
 /// [`trace`].
@@ -129,6 +129,15 @@ struct Trace<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
     rays: &'a [Ray],
     answers: &'a mut [Q::Answer],
     before: &'a mut Tightness,
+}
+
+impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Trace<'_, N, L, S, Q> {
+    type Output = Outcome;
+
+    #[inline(always)]
+    fn run<T: Simd>(self, token: T) -> Outcome {
+        token.in_packets(self)
+    }
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> PacketOperation
