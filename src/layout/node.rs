@@ -74,8 +74,8 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
     /// Of children, a bit each, those that there are.
     #[doc(hidden)]
     fn present(&self, children: u32) -> u32;
-    /// As [`test`](Self::test), of [planes](Self::planes) and the ray in lane `ray` modulo `RAYS` of as many, which is number `ray` in
-    /// `passing`. Children that there are not are left in.
+    /// As [`test`](Self::test), of [planes](Self::planes) and the ray in lane `ray` modulo `RAYS` of as many, which is number
+    /// `ray` in `passing`. Children that there are not are left in.
     #[doc(hidden)]
     fn test_one_of<const RAYS: usize, V: Vector<RAYS>>(
         planes: &[[Self::Lanes<V::Token>; 3]; 2],

@@ -78,8 +78,8 @@ impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
         new
     }
 
-    /// The same for rays that are spread over more packets than they would fill: as many at a time as fill one, whatever packets they are of.
-    /// Whether there is a hit is all that is found out.
+    /// The same for rays that are spread over more packets than they would fill: as many at a time as fill one, whatever
+    /// packets they are of. Whether there is a hit is all that is found out.
     #[inline(always)]
     fn test_scattered<Q: Query>(
         &self,
