@@ -25,5 +25,5 @@ pub(crate) use backend::{Operation, PacketOperation};
 pub(crate) use one::F32x1;
 pub(crate) use portable::Portable;
 pub(crate) use vector::{
-    Lanes, MAX_RUN, PREFETCHED, RUN_FIRST_BITS, Simd, Vector, load_all, packed_run, splat3,
+    Lanes, MAX_RUN, PREFETCHED, RUN_FIRST_BITS, Simd, Vector, packed_run, splat3,
 };

@@ -228,21 +228,6 @@ pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
         | (count.wrapping_sub(1) & (MAX_RUN as u32 - 1)) << RUN_FIRST_BITS
 }
 
-/// Eight vectors.
-#[inline(always)]
-pub fn load_all<S: Simd>(token: S, [a, b, c, d, e, f, g, h]: [&[f32; 8]; 8]) -> [S::F32x8; 8] {
-    [
-        S::F32x8::load(token, a),
-        S::F32x8::load(token, b),
-        S::F32x8::load(token, c),
-        S::F32x8::load(token, d),
-        S::F32x8::load(token, e),
-        S::F32x8::load(token, f),
-        S::F32x8::load(token, g),
-        S::F32x8::load(token, h),
-    ]
-}
-
 /// Three numbers, each in every lane of its vector.
 //
 // Not a closure given to `map`: closures do not inherit a backend's instructions and stay calls.
