@@ -3,7 +3,7 @@
 
 use super::{
     Lanes, PacketOperation, Simd, Vector, avx512,
-    vector::{MAX_RUN, RUN_FIRST_BITS},
+    vector::{MAX_RUN, RUN_FIRST_BITS, load_all},
 };
 use core::arch::x86_64::*;
 use core::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
@@ -289,20 +289,8 @@ impl_vector!(
         }
 
         #[inline(always)]
-        fn columns(
-            token: X86<AVX512>,
-            [a, b, c, d, e, f, g, h]: [&[f32; 8]; 8],
-        ) -> [Self; 8] {
-            token.transpose([
-                Self::load(token, a),
-                Self::load(token, b),
-                Self::load(token, c),
-                Self::load(token, d),
-                Self::load(token, e),
-                Self::load(token, f),
-                Self::load(token, g),
-                Self::load(token, h),
-            ])
+        fn columns(token: X86<AVX512>, rows: [&[f32; 8]; 8]) -> [Self; 8] {
+            token.transpose(load_all(token, rows))
         }
     }
 );

@@ -128,17 +128,7 @@ pub trait Vector<const N: usize>:
                 column[lane] = number;
             }
         }
-        let [a, b, c, d, e, f, g, h] = &columns;
-        [
-            Self::load(token, a),
-            Self::load(token, b),
-            Self::load(token, c),
-            Self::load(token, d),
-            Self::load(token, e),
-            Self::load(token, f),
-            Self::load(token, g),
-            Self::load(token, h),
-        ]
+        load_all(token, columns.each_ref())
     }
     /// One lane from each integer.
     #[inline(always)]
@@ -226,6 +216,24 @@ pub(crate) const MAX_RUN: usize = 1 << (31 - RUN_FIRST_BITS);
 pub(crate) const fn packed_run(first: u32, count: u32) -> u32 {
     first & ((1 << RUN_FIRST_BITS) - 1)
         | (count.wrapping_sub(1) & (MAX_RUN as u32 - 1)) << RUN_FIRST_BITS
+}
+
+/// Eight vectors.
+#[inline(always)]
+pub(super) fn load_all<const N: usize, V: Vector<N>>(
+    token: V::Token,
+    [a, b, c, d, e, f, g, h]: [&[f32; N]; 8],
+) -> [V; 8] {
+    [
+        V::load(token, a),
+        V::load(token, b),
+        V::load(token, c),
+        V::load(token, d),
+        V::load(token, e),
+        V::load(token, f),
+        V::load(token, g),
+        V::load(token, h),
+    ]
 }
 
 /// Three numbers, each in every lane of its vector.

@@ -6,7 +6,7 @@
 //! | [`closest_hits`](crate::layout::Bvh::closest_hits), [`any_hits`](crate::layout::Bvh::any_hits) | any number of rays, in any order: faster | 90 KiB of stack |
 //! | [`closest_hits_in`](crate::layout::Bvh::closest_hits_in), [`any_hits_in`](crate::layout::Bvh::any_hits_in) | the same | a [`Scratch`] of yours, 9 KiB of stack |
 //! | `par_closest_hits`, `par_any_hits` | the same, on all cores | the feature `rayon` |
-//! | [`closest_hit_packet`](crate::layout::Bvh::closest_hit_packet), [`any_hit_packet`](crate::layout::Bvh::any_hit_packet) | up to 64 rays, some of them inactive | 28 KiB of stack |
+//! | [`closest_hit_packet`](crate::layout::Bvh::closest_hit_packet), [`any_hit_packet`](crate::layout::Bvh::any_hit_packet) | up to 64 rays, some of them inactive | 36 KiB of stack |
 //! | [`closest_hit_counted`](crate::layout::Bvh::closest_hit_counted), [`any_hit_counted`](crate::layout::Bvh::any_hit_counted) | a ray, and what it cost | |
 //!
 //! A hierarchy over [primitives of your own](crate::primitive::Primitives) has `closest_hit` and `any_hit`, which are given
