@@ -5,12 +5,16 @@
 //! rounded once, whether or not the processor fuses the two. The numbers are chosen such that the rounded planes
 //! hold the child, and the slab test's proof holds for them as for any others.
 
-use super::{Child, ChildKind, Link, node::impl_wide_node};
+use super::{
+    Child, ChildKind, Link,
+    frame::{Frame, Planes},
+    node::impl_wide_node,
+};
 use crate::{
     geometry::Aabb,
     layout::run,
     simd::{Lanes, Simd, Vector, packed_run},
-    slab::{BundlePasses, BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane, pow2},
+    slab::{BundlePasses, BundleSlabs, FirstPlanes, NarrowRay, Passing, RaySlabs, lane},
 };
 use bytemuck::{Pod, Zeroable};
 use core::{fmt::Debug, mem::offset_of};
@@ -23,7 +27,7 @@ use glam::Vec3;
 pub struct CompactNode<const W: usize, H> {
     frame: Frame,
     head: H,
-    planes: [[[u8; W]; 2]; 3],
+    planes: Planes<W>,
 }
 
 /// Up to 4 children in 48 bytes.
@@ -33,83 +37,6 @@ pub type CompactNode8 = CompactNode<8, Head8>;
 
 impl_wide_node!(CompactNode4, 3, 4, F32x4, 48);
 impl_wide_node!(CompactNode8, 4, 8, F32x8, 80);
-
-/// The grid of a node's planes, by axis.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-struct Frame {
-    origin: [f32; 3],
-    /// The exponents of the steps, as floats have them.
-    steps: [u8; 3],
-    /// The head's.
-    more: u8,
-}
-
-/// Coordinates are cut off here. No box test looks at planes of such scenes: see [`slab`](crate::slab), (6).
-const MOST: f32 = pow2(100);
-/// The exponent of the least step there is, 2^-100: that of a denormal is lost where a program flushes those.
-const LEAST_STEP: u8 = 27;
-
-impl Frame {
-    /// The grid for `aabbs`, and the planes on it. Lanes without a box have planes of no meaning.
-    fn new<const W: usize>(aabbs: &[Aabb]) -> (Self, [[[u8; W]; 2]; 3]) {
-        let mut frame = Self::zeroed();
-        let mut planes = [[[0; W]; 2]; 3];
-        for (axis, [los, his]) in planes.iter_mut().enumerate() {
-            let side = |x: f32| x.clamp(-MOST, MOST) + 0.0;
-            let lo = |aabb: &Aabb| side(aabb.min[axis]);
-            let hi = |aabb: &Aabb| side(aabb.max[axis]);
-            let origin = aabbs.iter().map(lo).fold(MOST, f32::min);
-            let end = aabbs.iter().map(hi).fold(-MOST, f32::max);
-            frame.origin[axis] = origin;
-            let step = (f64::from(end) - f64::from(origin)) / 255.0;
-            frame.steps[axis] = ((step as f32).to_bits() >> 23).max(LEAST_STEP.into()) as u8;
-            // The step was rounded down to a power of two; and so is the plane, to a float.
-            while frame.above(axis, end).is_none() {
-                frame.steps[axis] += 1;
-            }
-            for (lane, aabb) in aabbs.iter().enumerate().take(W) {
-                los[lane] = frame.below(axis, lo(aabb));
-                his[lane] = frame.above(axis, hi(aabb)).unwrap_or(u8::MAX);
-            }
-        }
-        (frame, planes)
-    }
-
-    /// The number of the last plane that is not above `x`, which is not below the first.
-    fn below(&self, axis: usize, x: f32) -> u8 {
-        let mut number = self.number(axis, x);
-        while number > 0 && self.plane(axis, number) > x {
-            number -= 1;
-        }
-        number
-    }
-
-    /// The number of the first plane that is not below `x`, if there is one.
-    fn above(&self, axis: usize, x: f32) -> Option<u8> {
-        let mut number = self.number(axis, x);
-        while self.plane(axis, number) < x {
-            number = number.checked_add(1)?;
-        }
-        Some(number)
-    }
-
-    /// The number of a plane near `x`.
-    fn number(&self, axis: usize, x: f32) -> u8 {
-        let along = f64::from(x) - f64::from(self.origin[axis]);
-        (along / f64::from(self.step(axis))) as u8
-    }
-
-    #[inline(always)]
-    fn step(&self, axis: usize) -> f32 {
-        f32::from_bits(u32::from(self.steps[axis]) << 23)
-    }
-
-    #[inline(always)]
-    fn plane(&self, axis: usize, number: u8) -> f32 {
-        f32::from(number) * self.step(axis) + self.origin[axis]
-    }
-}
 
 /// Where a compact node's children are. Leaves have up to 4 primitives.
 pub trait Head: Pod + Debug {
@@ -419,7 +346,7 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
 mod tests {
     use super::*;
     use crate::{
-        layout::WideNode,
+        layout::{WideNode, frame::MOST},
         simd::{Backend, Lanes, Operation},
     };
     use fastrand::Rng;

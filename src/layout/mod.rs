@@ -6,6 +6,7 @@ pub mod bytes;
 mod check;
 mod child;
 mod compact;
+mod frame;
 mod full;
 mod gather;
 mod leaf;

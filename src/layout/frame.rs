@@ -1,0 +1,208 @@
+//! The grid that a compact node's boxes are on: where it begins, and how far its planes are apart.
+
+use crate::{geometry::Aabb, slab::pow2};
+use bytemuck::{Pod, Zeroable};
+
+/// The grid of a node's planes, by axis.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Frame {
+    pub origin: [f32; 3],
+    /// The exponents of the steps, as floats have them.
+    steps: [u8; 3],
+    /// The node's.
+    pub more: u8,
+}
+
+/// The numbers of a node's planes: by axis, lower and upper ones.
+pub(super) type Planes<const W: usize> = [[[u8; W]; 2]; 3];
+/// Where boxes are, likewise.
+type Sides<const W: usize> = [[[f32; W]; 2]; 3];
+
+/// Coordinates are cut off here. No box test looks at planes of such scenes: see [`slab`](crate::slab), (6).
+pub(super) const MOST: f32 = pow2(100);
+/// The exponent of the least step there is, 2^-100: that of a denormal is lost where a program flushes those.
+const LEAST_STEP: u8 = 27;
+
+/// Faces of boxes in the same one of so many parts of a step are at one plane, as good as.
+const PARTS: usize = 64;
+/// By how much faces of boxes without thickness, which are surfaces for certain, count for more.
+const THIN: f32 = 2.0;
+/// By how much upper faces count for more: what has a top has a bottom, too, but from that few rays leave.
+const UPPER: f32 = 1.125;
+
+impl Frame {
+    /// The grid for `aabbs`, and the planes on it. Lanes without a box have planes of no meaning.
+    pub fn new<const W: usize>(aabbs: &[Aabb]) -> (Self, Planes<W>) {
+        let count = aabbs.len().min(W);
+        let mut sides: Sides<W> = [[[0.0; W]; 2]; 3];
+        for (axis, sides) in sides.iter_mut().enumerate() {
+            for (lane, aabb) in aabbs[..count].iter().enumerate() {
+                sides[0][lane] = aabb.min[axis].clamp(-MOST, MOST) + 0.0;
+                sides[1][lane] = aabb.max[axis].clamp(-MOST, MOST) + 0.0;
+            }
+        }
+        let mut frame = Self::zeroed();
+        let mut planes = [[[0; W]; 2]; 3];
+        for (axis, [below, above]) in planes.iter_mut().enumerate() {
+            let [los, his] = sides[axis].each_ref().map(|sides| &sides[..count]);
+            let origin = los.iter().copied().fold(MOST, f32::min);
+            let end = his.iter().copied().fold(-MOST, f32::max);
+            frame.origin[axis] = origin;
+            let step = (f64::from(end) - f64::from(origin)) / 255.0;
+            frame.steps[axis] = ((step as f32).to_bits() >> 23).max(LEAST_STEP.into()) as u8;
+            // The step was rounded down to a power of two; and so is the plane, to a float.
+            while frame.above(axis, end).is_none() {
+                frame.steps[axis] += 1;
+            }
+            if let Some(face) = frame.main_face(axis, &sides, count) {
+                frame.align(axis, face, end);
+            }
+            for lane in 0..count {
+                below[lane] = frame.below(axis, los[lane]);
+                above[lane] = frame.above(axis, his[lane]).unwrap_or(u8::MAX);
+            }
+        }
+        (frame, planes)
+    }
+
+    /// Where along an axis the boxes have faces that matter most: a coordinate, and whether an upper face is there.
+    ///
+    /// Rays leave from surfaces. Where one faces along an axis, a box around it ends there; if it ends a little later on the
+    /// grid, every ray that leaves the surface is in the box, and has its triangles tested.
+    fn main_face<const W: usize>(
+        &self,
+        axis: usize,
+        sides: &Sides<W>,
+        count: usize,
+    ) -> Option<(f32, bool)> {
+        let size = |axis: usize, lane: usize| sides[axis][1][lane] - sides[axis][0][lane];
+        let part = |x: f32| {
+            let steps = self.steps_to(axis, x);
+            ((steps - f64::from(steps as u8)) * PARTS as f64 + 0.5) as usize % PARTS
+        };
+        // By part.
+        let mut weights = [0.0; PARTS];
+        // By side and lane.
+        let (mut parts, mut areas) = ([[0; W]; 2], [[0.0; W]; 2]);
+        for lane in 0..count {
+            let mut area = size((axis + 1) % 3, lane) * size((axis + 2) % 3, lane);
+            if size(axis, lane) * PARTS as f32 <= self.step(axis) {
+                area *= THIN;
+            }
+            for (side, area) in [area, area * UPPER].into_iter().enumerate() {
+                let part = part(sides[axis][side][lane]);
+                (parts[side][lane], areas[side][lane]) = (part, area);
+                weights[part] += area;
+            }
+        }
+        let (mut most, mut face) = ((0.0, 0.0), None);
+        for side in 0..2 {
+            for lane in 0..count {
+                let weight = (weights[parts[side][lane]], areas[side][lane]);
+                if weight > most {
+                    (most, face) = (weight, Some((sides[axis][side][lane], side == 1)));
+                }
+            }
+        }
+        face
+    }
+
+    /// Moves the grid along an axis, down by less than a step, to have a plane at a face, if boxes that end at `end` have
+    /// room then.
+    fn align(&mut self, axis: usize, (face, is_upper): (f32, bool), end: f32) {
+        let mut moved = *self;
+        let steps = self.steps_to(axis, face);
+        let number = (steps as u8).saturating_add(u8::from(f64::from(steps as u8) < steps));
+        let below = f64::from(number) * f64::from(self.step(axis));
+        let origin = (f64::from(face) - below) as f32;
+        moved.origin[axis] = origin;
+        // Rounded, the plane may be on the wrong side.
+        let plane = moved.plane(axis, number);
+        if is_upper && plane < face {
+            moved.origin[axis] = origin.next_up();
+        } else if !is_upper && plane > face {
+            moved.origin[axis] = origin.next_down();
+        }
+        let [first, last] = [0, u8::MAX].map(|number| moved.plane(axis, number));
+        if first <= self.origin[axis] && end <= last {
+            *self = moved;
+        }
+    }
+
+    /// The number of the last plane that is not above `x`, which is not below the first.
+    fn below(&self, axis: usize, x: f32) -> u8 {
+        let mut number = self.number(axis, x);
+        while number > 0 && self.plane(axis, number) > x {
+            number -= 1;
+        }
+        number
+    }
+
+    /// The number of the first plane that is not below `x`, if there is one.
+    fn above(&self, axis: usize, x: f32) -> Option<u8> {
+        let mut number = self.number(axis, x);
+        while self.plane(axis, number) < x {
+            number = number.checked_add(1)?;
+        }
+        Some(number)
+    }
+
+    /// The number of a plane near `x`.
+    fn number(&self, axis: usize, x: f32) -> u8 {
+        self.steps_to(axis, x) as u8
+    }
+
+    /// How many steps it is from the first plane to `x`.
+    fn steps_to(&self, axis: usize, x: f32) -> f64 {
+        // A power of two has its inverse.
+        let exponent = 1023 + 127 - u64::from(self.steps[axis]);
+        (f64::from(x) - f64::from(self.origin[axis])) * f64::from_bits(exponent << 52)
+    }
+
+    #[inline(always)]
+    pub fn step(&self, axis: usize) -> f32 {
+        f32::from_bits(u32::from(self.steps[axis]) << 23)
+    }
+
+    #[inline(always)]
+    pub fn plane(&self, axis: usize, number: u8) -> f32 {
+        f32::from(number) * self.step(axis) + self.origin[axis]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// A floor among smaller things, at any height, is as flat on the grid as it is.
+    #[test]
+    fn a_large_face_is_on_the_grid() {
+        let mut rng = fastrand::Rng::with_seed(9);
+        for _ in 0..2_000 {
+            let mut point = |size: f32| Vec3::new(rng.f32(), rng.f32(), rng.f32()) * size;
+            let aabbs = [(); 8].map(|()| {
+                let min = point(100.0);
+                Aabb::new(min, min + point(20.0))
+            });
+            for axis in 0..3 {
+                let mut aabbs = aabbs;
+                let floor = &mut aabbs[rng.usize(..8)];
+                *floor = Aabb::new(Vec3::ZERO, Vec3::splat(120.0));
+                let height = rng.f32() * 100.0;
+                (floor.min[axis], floor.max[axis]) = (height, height);
+                let lane = aabbs.iter().position(|aabb| aabb.max[axis] == height);
+                let (frame, planes) = Frame::new::<8>(&aabbs);
+                let sides = planes[axis].map(|numbers| frame.plane(axis, numbers[lane.unwrap()]));
+                let nearly = frame.step(axis) / PARTS as f32;
+                assert!(sides[0] <= height && height <= sides[1]);
+                let is_flat = sides[1] - height <= nearly || height - sides[0] <= nearly;
+                // With a step more than the grid is long there would be no room to move it.
+                let ends = aabbs.iter().fold(Aabb::EMPTY, |all, aabb| all.join(*aabb));
+                let full = ends.size()[axis] > 254.0 * frame.step(axis);
+                assert!(is_flat || full, "{sides:?} around {height}");
+            }
+        }
+    }
+}
