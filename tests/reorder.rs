@@ -9,23 +9,32 @@ use proptest::prelude::*;
 use wide_bvh::{
     build::{Builder, ReorderedMesh},
     geometry::{Ray, TriangleMesh},
-    layout::{Bvh, CompactNode4, CompactNode8, MeshTooSmall, Owned, RunLeaf, WideNode},
+    layout::{
+        AlignedBytes, Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, Counted, LayoutError,
+        MeshTooSmall, OrderedBvh8, OrderedLeaf, OrderedMeshBvh8, OrderedMeshLeaf, Owned, WideNode,
+    },
     reference,
 };
 use wide_bvh_scenes::shapes;
 
 /// Reorders, and checks the mesh that comes out.
-fn reordered<N: WideNode>(mesh: &TriangleMesh) -> (Bvh<N, RunLeaf, Owned>, ReorderedMesh) {
+fn reordered<N: WideNode>(mesh: &TriangleMesh) -> (Bvh<N, OrderedLeaf, Owned>, ReorderedMesh) {
     let builder = Builder::new().splits(1.0).drop_non_finite(true);
-    let mut bvh = builder.build_compact::<N>(mesh).unwrap();
-    let before = bvh.primitives().to_vec();
-    let new = bvh.reorder(mesh).unwrap();
-    // The same triangles, by the numbers that they had.
-    assert_eq!(new.triangles.len(), mesh.len());
-    assert_eq!(new.indices.len(), mesh.len());
+    let bvh = builder.build_compact::<N>(mesh).unwrap();
+    let (ordered, new) = bvh.reorder(mesh).unwrap();
+    assert_eq!(bvh.nodes().len(), ordered.nodes().len());
+    assert_eq!(bvh.primitive_count(), ordered.primitive_count());
+    assert_eq!(bvh.dropped(), ordered.dropped());
+    assert_eq!(ordered.bytes(), size_of_val(ordered.nodes()));
+    // Those of the list, then the others, by the numbers that they had.
+    let (listed, others) = new.triangles.split_at(bvh.primitive_count());
+    assert_eq!(listed, bvh.primitives());
+    assert!(others.is_sorted() && others.iter().all(|other| !listed.contains(other)));
     let mut numbers = new.triangles.clone();
     numbers.sort_unstable();
+    numbers.dedup();
     assert!(numbers.into_iter().eq(0..mesh.len() as u32));
+    assert_eq!(new.indices.len(), new.triangles.len());
     for (corners, &was) in new.indices.iter().zip(&new.triangles) {
         let vertices = corners.map(|corner| new.vertices[corner as usize]);
         assert_eq!(vertices, mesh.indices()[was as usize]);
@@ -34,20 +43,14 @@ fn reordered<N: WideNode>(mesh: &TriangleMesh) -> (Bvh<N, RunLeaf, Owned>, Reord
     for (&position, &was) in new.positions.iter().zip(&new.vertices) {
         assert_eq!(bits(position), bits(mesh.positions()[was as usize]));
     }
-    // In the order in which they are met, and each vertex is there once.
-    let mut next = 0;
-    for (&number, &was) in bvh.primitives().iter().zip(&before) {
-        assert_eq!(new.triangles[number as usize], was);
-        assert!(number <= next);
-        next = next.max(number + 1);
-    }
+    // In the order in which they are met, each once.
     let mut next = 0;
     for &vertex in new.indices.iter().flatten() {
         assert!(vertex <= next);
         next = next.max(vertex + 1);
     }
     assert_eq!(next as usize, new.positions.len());
-    (bvh, new)
+    (ordered, new)
 }
 
 fn check<N: WideNode>(mesh: &TriangleMesh, rays: &[Ray]) {
@@ -64,6 +67,28 @@ fn check<N: WideNode>(mesh: &TriangleMesh, rays: &[Ray]) {
             before.map(|hit| hit.t),
             "{ray:?}"
         );
+    }
+    let mut hits = vec![None; rays.len()];
+    over.closest_hits(rays, &mut hits);
+    for (&hit, ray) in hits.iter().zip(rays) {
+        assert_eq!(bits(hit), bits(over.closest_hit(ray)), "{ray:?}");
+    }
+    in_bytes(&bvh, &view, rays);
+}
+
+/// Written with its mesh and without, and opened in place.
+fn in_bytes<N: WideNode>(bvh: &Bvh<N, OrderedLeaf, Owned>, mesh: &TriangleMesh, rays: &[Ray]) {
+    let alone = AlignedBytes::new(&bvh.to_bytes().unwrap()[..]);
+    let alone = Bvh::<N, OrderedLeaf, Borrowed>::from_bytes(&alone).unwrap();
+    let over = bvh.over(mesh).unwrap();
+    let whole = AlignedBytes::new(&over.to_bytes().unwrap()[..]);
+    let whole = Bvh::<N, OrderedMeshLeaf, Borrowed>::from_bytes(&whole).unwrap();
+    assert_eq!(alone.primitive_count(), bvh.primitive_count());
+    let again = alone.over(mesh).unwrap();
+    for ray in rays {
+        let hit = bits(over.closest_hit(ray));
+        assert_eq!(bits(whole.closest_hit(ray)), hit, "{ray:?}");
+        assert_eq!(bits(again.closest_hit(ray)), hit, "{ray:?}");
     }
 }
 
@@ -112,8 +137,7 @@ fn shapes_out_of_order() {
 fn another_mesh() {
     let mesh = shapes::icosphere(2);
     let view = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
-    let mut bvh = Builder::new().build_compact::<CompactNode8>(&view).unwrap();
-    let before = bvh.primitives().to_vec();
+    let bvh = Builder::new().build_compact::<CompactNode8>(&view).unwrap();
     let fewer = &mesh.indices[1..];
     let fewer = TriangleMesh::new(&mesh.positions, fewer).unwrap();
     let error = bvh.reorder(&fewer).unwrap_err();
@@ -125,5 +149,40 @@ fn another_mesh() {
             needed: needed as u64
         }
     );
-    assert_eq!(bvh.primitives(), before);
+}
+
+/// Of an ordered hierarchy it is how many primitives there are that has to be right.
+#[test]
+fn counts() {
+    let mesh = shapes::icosphere(2);
+    let view = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+    let bvh = Builder::new().build_compact::<CompactNode8>(&view).unwrap();
+    let (ordered, new) = bvh.reorder(&view).unwrap();
+    let count = ordered.primitive_count();
+    let (nodes, bounds) = (ordered.nodes(), *ordered.bounds());
+    let of = |count| {
+        let counted = Counted { of: (), count };
+        OrderedBvh8::from_parts(nodes.to_vec(), counted, vec![], bounds).map(|_| ())
+    };
+    assert_eq!(of(count), Ok(()));
+    assert_eq!(of(count + 1), Err(LayoutError::UnusedLeaves(count)));
+    assert!(matches!(of(count - 1), Err(LayoutError::Child { .. })));
+    assert_eq!(of(1 << 29), Err(LayoutError::TooLarge));
+
+    let needed = count as u64;
+    let triangles = count - 1;
+    let fewer = TriangleMesh::new(&new.positions, &new.indices[..triangles]).unwrap();
+    let too_small = MeshTooSmall { triangles, needed };
+    assert_eq!(ordered.over(&fewer).unwrap_err(), too_small);
+    let of = Counted { of: fewer, count };
+    let error = OrderedMeshBvh8::from_parts(nodes, of, &[], bounds).unwrap_err();
+    assert_eq!(error, LayoutError::Primitive(triangles));
+
+    let bytes = AlignedBytes::new(&ordered.to_bytes().unwrap()[..]);
+    let error = OrderedMeshBvh8::from_bytes(&bytes).unwrap_err();
+    let no_mesh = MeshTooSmall {
+        triangles: 0,
+        needed,
+    };
+    assert_eq!(error, BytesError::MeshTooSmall(no_mesh));
 }

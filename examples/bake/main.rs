@@ -19,7 +19,7 @@ use std::{
 use wide_bvh::{
     build::{Builder, ReorderedMesh},
     geometry::TriangleMesh,
-    layout::{Bvh, CompactNode4, CompactNode8, Node4, Node8, Owned, RunLeaf, WideNode},
+    layout::{CompactNode4, CompactNode8, Node4, Node8, WideNode},
 };
 use wide_bvh_scenes::{Mesh, load};
 
@@ -101,29 +101,35 @@ fn compact<N: WideNode>(mesh: &Mesh, in_file: MeshInFile) -> Result<Baked, Box<d
     let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
     let mut numbers = Vec::new();
     let start = Instant::now();
-    let mut tree = builder().build_compact::<N>(&triangles)?;
+    let tree = builder().build_compact::<N>(&triangles)?;
     let time = start.elapsed();
-    let mut parts = vec![
-        ("nodes", size_of_val(tree.nodes())),
-        ("leaf data", size_of_val(tree.primitives())),
-    ];
-    let mut with_mesh = |tree: &Bvh<N, RunLeaf, Owned>, mesh: &TriangleMesh| {
+    let mut parts = vec![("nodes", size_of_val(tree.nodes()))];
+    let list = ("leaf data", size_of_val(tree.primitives()));
+    let mesh_part = |mesh: &TriangleMesh| {
         let bytes = size_of_val(mesh.positions()) + size_of_val(mesh.indices());
-        parts.push(("mesh", bytes));
-        Ok::<_, Box<dyn Error>>(tree.over(mesh)?.to_bytes()?)
+        ("mesh", bytes)
     };
     let bytes = match in_file {
-        MeshInFile::None => tree.to_bytes()?,
-        MeshInFile::AsItIs => with_mesh(&tree, &triangles)?,
+        MeshInFile::None => {
+            parts.push(list);
+            tree.to_bytes()?
+        }
+        MeshInFile::AsItIs => {
+            parts.extend([list, mesh_part(&triangles)]);
+            tree.over(&triangles)?.to_bytes()?
+        }
         MeshInFile::Reordered => {
+            let (ordered, new) = tree.reorder(&triangles)?;
             let ReorderedMesh {
                 positions,
                 indices,
                 vertices,
                 triangles,
-            } = tree.reorder(&triangles)?;
+            } = new;
             numbers.extend(triangles.into_iter().chain(vertices));
-            with_mesh(&tree, &TriangleMesh::new(&positions, &indices)?)?
+            let mesh = TriangleMesh::new(&positions, &indices)?;
+            parts.push(mesh_part(&mesh));
+            ordered.over(&mesh)?.to_bytes()?
         }
     };
     Ok(Baked {

@@ -17,8 +17,8 @@ use wide_bvh::{
     build::Builder,
     geometry::{Hit, Ray, TriangleMesh},
     layout::{
-        Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, RunLeaf,
-        TriangleLeaf, WideNode, bytes::Header,
+        Borrowed, Bvh, ByList, BytesError, CompactNode4, CompactNode8, InOrder, Node4, Node8,
+        Order, Runs, TriangleLeaf, WideNode, bytes::Header,
     },
     traverse::Counts,
 };
@@ -110,8 +110,10 @@ impl Baked {
         let (mesh, opened) = match (header.node_kind, header.leaf_kind) {
             (1, 1) => self.own_leaves::<Node4>(),
             (2, 1) => self.own_leaves::<Node8>(),
-            (3, 3) => self.runs::<CompactNode4>(),
-            (4, 3) => self.runs::<CompactNode8>(),
+            (3, 3) => self.runs::<CompactNode4, ByList>(),
+            (4, 3) => self.runs::<CompactNode8, ByList>(),
+            (3, 4) => self.runs::<CompactNode4, InOrder>(),
+            (4, 4) => self.runs::<CompactNode8, InOrder>(),
             (nodes, leaves) => Err(format!(
                 "nodes of kind {nodes} with leaves of kind {leaves}"
             ))?,
@@ -158,12 +160,12 @@ impl Baked {
     }
 
     /// Leaves that read the mesh, which is in the file or not.
-    fn runs<N: WideNode + Sync>(&self) -> Result<Opened<'_>, Box<dyn Error>> {
-        match Bvh::<N, MeshLeaf, Borrowed>::from_bytes(&self.map) {
+    fn runs<N: WideNode, O: Order + 'static>(&self) -> Result<Opened<'_>, Box<dyn Error>> {
+        match Bvh::<N, Runs<TriangleMesh, O>, Borrowed>::from_bytes(&self.map) {
             Ok(_) if self.over.is_some() => Err("its mesh is in it: it takes no --over".into()),
             Ok(bvh) => Ok((*bvh.mesh(), Box::new(bvh))),
             Err(BytesError::MeshTooSmall(small)) if small.triangles == 0 => {
-                let tree = Bvh::<N, RunLeaf, Borrowed>::from_bytes(&self.map)?;
+                let tree = Bvh::<N, Runs<(), O>, Borrowed>::from_bytes(&self.map)?;
                 let mesh = self.over()?;
                 tree.over(&mesh)?;
                 Ok((mesh, Box::new(Over { tree, mesh })))
@@ -177,20 +179,20 @@ impl Baked {
 type Opened<'m> = (TriangleMesh<'m>, Box<dyn Hierarchy + 'm>);
 
 /// A tree without its mesh, and that.
-struct Over<'m, N: WideNode> {
-    tree: Bvh<N, RunLeaf, Borrowed<'m>>,
+struct Over<'m, N: WideNode, O: Order> {
+    tree: Bvh<N, Runs<(), O>, Borrowed<'m>>,
     mesh: TriangleMesh<'m>,
 }
 
-impl<N: WideNode> Over<'_, N> {
+impl<N: WideNode, O: Order> Over<'_, N, O> {
     /// What the two are together. It takes next to nothing.
-    fn bvh(&self) -> Bvh<N, MeshLeaf<'_>, Borrowed<'_>> {
+    fn bvh(&self) -> Bvh<N, Runs<TriangleMesh<'_>, O>, Borrowed<'_>> {
         let bvh = self.tree.over(&self.mesh);
         bvh.expect("as when it was opened")
     }
 }
 
-impl<N: WideNode + Sync> Hierarchy for Over<'_, N> {
+impl<N: WideNode, O: Order> Hierarchy for Over<'_, N, O> {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.bvh().closest_hit(ray)
     }

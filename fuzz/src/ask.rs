@@ -1,8 +1,8 @@
 //! Every query, in every way it can be asked, on every backend.
 
 use wide_bvh::{
-    geometry::{Hit, Ray},
-    layout::{Borrowed, Bvh, MeshLeaf, PrimitiveLeaf, TriangleLeaf, TriangleLeaves, WideNode},
+    geometry::{Hit, Ray, TriangleMesh},
+    layout::{Borrowed, Bvh, Order, PrimitiveLeaf, Runs, TriangleLeaf, TriangleLeaves, WideNode},
     primitive::{PrimitiveHit, Primitives},
     simd::Backend,
     traverse::Scratch,
@@ -161,8 +161,8 @@ fn packets<N: WideNode, L: TriangleLeaves, const RAYS: usize>(
 }
 
 /// As [`ask`], of leaves that read a mesh, in a few ways.
-pub(crate) fn ask_mesh<'a, N: WideNode>(
-    mut bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
+pub(crate) fn ask_mesh<'a, N: WideNode, O: Order>(
+    mut bvh: Bvh<N, Runs<TriangleMesh<'a>, O>, Borrowed<'a>>,
     rays: &[Ray],
 ) -> Vec<Answers> {
     let mut answers = Vec::new();

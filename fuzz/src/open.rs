@@ -7,8 +7,8 @@ use crate::{
 use wide_bvh::{
     geometry::{Aabb, Ray, TriangleMesh},
     layout::{
-        Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, Open,
-        PrimitiveLeaf, RunLeaf, TriangleLeaf, WideNode,
+        Borrowed, Bvh, ByList, BytesError, CompactNode4, CompactNode8, InOrder, Node4, Node8, Open,
+        Order, PrimitiveLeaf, Runs, TriangleLeaf, WideNode,
     },
 };
 
@@ -19,8 +19,10 @@ pub struct Opened {
     pub answers: Vec<Answers>,
     /// Written again.
     pub bytes: Vec<u8>,
-    /// The number of each primitive in the leaves.
+    /// The number of each primitive in the leaves; none if there is no list.
     pub primitives: Vec<u32>,
+    /// How many there are.
+    pub count: usize,
 }
 
 /// Opens bytes as every kind of nodes with every kind of leaves, and asks what opens. `mesh` is what leaves are put over
@@ -49,19 +51,28 @@ struct Given<'a> {
 }
 
 #[inline(never)]
-fn of_nodes<N: WideNode>(bytes: &[u8], given: &Given) -> [Result<Opened, BytesError>; 4] {
-    let Given { rays, mesh, boxes } = *given;
-    [
+fn of_nodes<N: WideNode>(bytes: &[u8], given: &Given) -> Vec<Result<Opened, BytesError>> {
+    let Given { rays, boxes, .. } = *given;
+    let mut outcomes = vec![
         opened::<N, TriangleLeaf>(bytes, |bvh| ask(bvh, rays, u64::MAX)),
         opened::<N, PrimitiveLeaf>(bytes, |bvh| ask_primitives(bvh, &Liar(boxes), rays)),
-        opened::<N, RunLeaf>(bytes, |bvh| match bvh.over(mesh) {
+    ];
+    outcomes.extend(of_runs::<N, ByList>(bytes, given));
+    outcomes.extend(of_runs::<N, InOrder>(bytes, given));
+    outcomes
+}
+
+fn of_runs<N: WideNode, O: Order>(bytes: &[u8], given: &Given) -> [Result<Opened, BytesError>; 2] {
+    let Given { rays, mesh, .. } = *given;
+    [
+        opened::<N, Runs<(), O>>(bytes, |bvh| match bvh.over(mesh) {
             Ok(bvh) => ask_mesh(bvh, rays),
             Err(error) => {
                 assert!(error.needed > mesh.len() as u64);
                 Vec::new()
             }
         }),
-        opened::<N, MeshLeaf>(bytes, |bvh| ask_mesh(bvh, rays)),
+        opened::<N, Runs<TriangleMesh, O>>(bytes, |bvh| ask_mesh(bvh, rays)),
     ]
 }
 
@@ -76,6 +87,7 @@ fn opened<'a, N: WideNode, L: Open<'a> + 'a>(
     Ok(Opened {
         bytes: bvh.to_bytes().expect("as many as there were"),
         primitives: bvh.primitives().to_vec(),
+        count: bvh.primitive_count(),
         answers: ask(bvh),
     })
 }

@@ -32,16 +32,24 @@ impl<L: TriangleLeaves> Leaves for Approximate<L> {
         L::only(count)
     }
 
+    fn len<S: Storage>(store: &L::Store<S>, primitives: &[u32]) -> usize {
+        L::len::<S>(store, primitives)
+    }
+
     fn count<S: Storage>(store: &L::Store<S>, primitives: &[u32]) -> Result<usize, LayoutError> {
         L::count::<S>(store, primitives)
     }
 
-    fn numbers(primitives: &[u32]) -> u64 {
-        L::numbers(primitives)
+    fn numbers<S: Storage>(store: &L::Store<S>, primitives: &[u32]) -> u64 {
+        L::numbers::<S>(store, primitives)
     }
 
     fn known<S: Storage>(store: &L::Store<S>) -> Option<usize> {
         L::known::<S>(store)
+    }
+
+    fn unknown<S: Storage>(store: &L::Store<S>, primitives: &[u32]) -> Option<usize> {
+        L::unknown::<S>(store, primitives)
     }
 
     fn borrowed<S: Storage>(store: &L::Store<S>) -> L::Store<Borrowed<'_>> {

@@ -1,8 +1,11 @@
 //! The hierarchy: its parts, checked once when they are put together.
 
+#[cfg(feature = "std")]
+use super::Counted;
 use super::{
     Borrowed, Child, CompactNode4, CompactNode8, LayoutError, Leaf, Leaves, Link, MeshLeaf, Node4,
-    Node8, PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode, check,
+    Node8, OrderedLeaf, OrderedMeshLeaf, PrimitiveLeaf, RunLeaf, Storage, TriangleLeaf, WideNode,
+    check,
 };
 use crate::{
     geometry::Aabb,
@@ -48,6 +51,15 @@ pub type MeshBvh8<'a> = Bvh<CompactNode8, MeshLeaf<'a>, Borrowed<'a>>;
 /// A mesh's triangles under 4-wide nodes of 48 bytes, borrowed, mesh and all. Queries: [`traverse`](crate::traverse).
 pub type MeshBvh4<'a> = Bvh<CompactNode4, MeshLeaf<'a>, Borrowed<'a>>;
 
+/// Nodes of 80 bytes alone, 8 wide, over primitives in the order of leaves, borrowed. Queries: [`traverse`](crate::traverse).
+pub type OrderedBvh8Ref<'a> = Bvh<CompactNode8, OrderedLeaf, Borrowed<'a>>;
+/// Nodes of 48 bytes alone, 4 wide, over primitives in the order of leaves, borrowed. Queries: [`traverse`](crate::traverse).
+pub type OrderedBvh4Ref<'a> = Bvh<CompactNode4, OrderedLeaf, Borrowed<'a>>;
+/// The same 8-wide nodes over a mesh, borrowed, mesh and all. Queries: [`traverse`](crate::traverse).
+pub type OrderedMeshBvh8<'a> = Bvh<CompactNode8, OrderedMeshLeaf<'a>, Borrowed<'a>>;
+/// The same 4-wide nodes over a mesh, borrowed, mesh and all. Queries: [`traverse`](crate::traverse).
+pub type OrderedMeshBvh4<'a> = Bvh<CompactNode4, OrderedMeshLeaf<'a>, Borrowed<'a>>;
+
 #[cfg(feature = "alloc")]
 mod owned {
     use super::*;
@@ -65,6 +77,10 @@ mod owned {
     pub type CompactBvh8 = Bvh<CompactNode8, RunLeaf, Owned>;
     /// Primitive numbers under 4-wide nodes of 48 bytes. Queries: [`traverse`](crate::traverse).
     pub type CompactBvh4 = Bvh<CompactNode4, RunLeaf, Owned>;
+    /// Nodes of 80 bytes alone, 8 wide, over primitives in the order of leaves. Queries: [`traverse`](crate::traverse).
+    pub type OrderedBvh8 = Bvh<CompactNode8, OrderedLeaf, Owned>;
+    /// Nodes of 48 bytes alone, 4 wide, over primitives in the order of leaves. Queries: [`traverse`](crate::traverse).
+    pub type OrderedBvh4 = Bvh<CompactNode4, OrderedLeaf, Owned>;
 }
 #[cfg(feature = "alloc")]
 pub use owned::*;
@@ -99,7 +115,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         root: Child,
     ) -> Self {
         Self {
-            numbers: L::numbers(&primitives),
+            numbers: L::numbers::<S>(&leaves, &primitives),
             nodes,
             leaves,
             primitives,
@@ -124,7 +140,13 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// Whether it is more than the caches are likely to hold.
     #[inline(always)]
     pub(crate) fn is_large(&self) -> bool {
-        self.primitives().len() > LARGE
+        self.primitive_count() > LARGE
+    }
+
+    /// How many primitives all leaves have together: one that is in several is counted as often.
+    #[inline(always)]
+    pub fn primitive_count(&self) -> usize {
+        L::len::<S>(&self.leaves, &self.primitives)
     }
 
     /// Has fetched what is read next of the leaf at a place: [`Leaves::fetch_next`].
@@ -174,7 +196,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         unsafe { L::at::<S>(&self.leaves, &self.primitives, place) }
     }
 
-    /// The number of each primitive in the leaves.
+    /// The number of each primitive in the leaves; none where it is its place ([`OrderedLeaf`](super::OrderedLeaf)).
     #[inline(always)]
     pub fn primitives(&self) -> &[u32] {
         &self.primitives
@@ -300,12 +322,22 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
 
 #[cfg(feature = "std")]
 impl<N: WideNode> Bvh<N, RunLeaf, crate::layout::Owned> {
-    /// Gives each primitive the number that `numbers` has for the one it had.
-    pub(crate) fn renumber(&mut self, numbers: &[u32]) {
-        for primitive in &mut self.primitives {
-            *primitive = numbers[*primitive as usize];
+    /// The same over primitives that are in the order of the list. `nodes` are its own.
+    pub(crate) fn in_order(
+        &self,
+        nodes: alloc::vec::Vec<N>,
+    ) -> Bvh<N, OrderedLeaf, crate::layout::Owned> {
+        let count = self.primitive_count();
+        Bvh {
+            nodes,
+            leaves: Counted { of: (), count },
+            primitives: alloc::vec::Vec::new(),
+            numbers: count as u64,
+            root: self.root,
+            bounds: self.bounds,
+            backend: self.backend,
+            dropped: self.dropped,
         }
-        self.numbers = RunLeaf::numbers(&self.primitives);
     }
 }
 
@@ -322,7 +354,7 @@ impl<N: WideNode, L: Leaves, S: Storage> fmt::Debug for Bvh<N, L, S> {
         f.debug_struct("Bvh")
             .field("width", &N::WIDTH)
             .field("nodes", &self.nodes.len())
-            .field("primitives", &self.primitives.len())
+            .field("primitives", &self.primitive_count())
             .field("bounds", &self.bounds)
             .field("backend", &self.backend)
             .finish()

@@ -83,10 +83,8 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
     let count = L::count::<S>(leaves, primitives)?;
-    let root = root::<N, L>(nodes.len(), count, primitives.len())?;
-    if let Some(known) = L::known::<S>(leaves)
-        && let Some(place) = primitives.iter().position(|&id| id as usize >= known)
-    {
+    let root = root::<N, L>(nodes.len(), count, L::len::<S>(leaves, primitives))?;
+    if let Some(place) = L::unknown::<S>(leaves, primitives) {
         return Err(LayoutError::Primitive(place));
     }
     if nodes.is_empty() {

@@ -25,6 +25,11 @@ pub trait Leaves: Sized {
     /// The place of the only leaf of a hierarchy, over `count` of what is counted, if that is one leaf.
     #[doc(hidden)]
     fn only(count: usize) -> Option<u32>;
+    /// How many places of primitives there are.
+    #[doc(hidden)]
+    fn len<S: Storage>(_store: &Self::Store<S>, primitives: &[u32]) -> usize {
+        primitives.len()
+    }
     /// How many there are of what is counted.
     ///
     /// # Errors
@@ -33,13 +38,19 @@ pub trait Leaves: Sized {
     fn count<S: Storage>(store: &Self::Store<S>, primitives: &[u32]) -> Result<usize, LayoutError>;
     /// One more than the greatest primitive number, if what has the numbers is not checked by itself.
     #[doc(hidden)]
-    fn numbers(_primitives: &[u32]) -> u64 {
+    fn numbers<S: Storage>(_store: &Self::Store<S>, _primitives: &[u32]) -> u64 {
         0
     }
     /// How many primitives there are for numbers to tell apart, if that is known.
     #[doc(hidden)]
     fn known<S: Storage>(_store: &Self::Store<S>) -> Option<usize> {
         None
+    }
+    /// The first place at which is the number of none of them, if that is known.
+    #[doc(hidden)]
+    fn unknown<S: Storage>(store: &Self::Store<S>, primitives: &[u32]) -> Option<usize> {
+        let known = Self::known::<S>(store)?;
+        primitives.iter().position(|&id| id as usize >= known)
     }
     /// The same, borrowed.
     #[doc(hidden)]

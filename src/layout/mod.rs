@@ -12,6 +12,7 @@ mod gather;
 mod leaf;
 mod leaves;
 mod node;
+mod order;
 mod run;
 mod storage;
 
@@ -19,11 +20,13 @@ pub use approximate::Approximate;
 #[cfg(feature = "std")]
 pub(crate) use bvh::tested_bounds;
 pub use bvh::{
-    Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, PrimitiveBvh4Ref,
-    PrimitiveBvh8Ref,
+    Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, OrderedBvh4Ref,
+    OrderedBvh8Ref, OrderedMeshBvh4, OrderedMeshBvh8, PrimitiveBvh4Ref, PrimitiveBvh8Ref,
 };
 #[cfg(feature = "alloc")]
-pub use bvh::{Bvh4, Bvh8, CompactBvh4, CompactBvh8, PrimitiveBvh4, PrimitiveBvh8};
+pub use bvh::{
+    Bvh4, Bvh8, CompactBvh4, CompactBvh8, OrderedBvh4, OrderedBvh8, PrimitiveBvh4, PrimitiveBvh8,
+};
 #[cfg(feature = "alloc")]
 pub use bytes::AlignedBytes;
 pub use bytes::{Aligned, BytesError, InBytes, Open};
@@ -37,7 +40,9 @@ pub use leaf::{Leaf, PrimitiveLeaf, TriangleLeaf};
 pub(crate) use leaves::Listed;
 pub use leaves::{Leaves, TriangleLeaves, Triangles};
 pub use node::WideNode;
-pub use run::{MeshLeaf, MeshTooSmall, RunLeaf, Runs};
+pub(crate) use order::number_at;
+pub use order::{ByList, Counted, InOrder, Order};
+pub use run::{MeshLeaf, MeshTooSmall, OrderedLeaf, OrderedMeshLeaf, RunLeaf, Runs};
 #[cfg(feature = "alloc")]
 pub use storage::Owned;
 pub use storage::{Borrowed, Storage};

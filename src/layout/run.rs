@@ -1,15 +1,15 @@
-//! Leaves that are nothing but runs of the list of primitive numbers, said by the links that lead to them.
+//! Leaves that are nothing but runs of primitives, said by the links that lead to them.
 
 use super::{
-    Borrowed, Bvh, Gather, LayoutError, Leaves, Listed, Storage, TriangleLeaf, Triangles, WideNode,
-    gather::Gathering, leaves::in_lanes,
+    Borrowed, Bvh, ByList, Gather, InOrder, LayoutError, Leaves, Listed, Order, Storage,
+    TriangleLeaf, Triangles, WideNode, gather::Gathering, leaves::in_lanes, order::Part,
 };
 use crate::{
     geometry::TriangleMesh,
     primitive::triangle::{Exact, Look, RayShear, Sheared},
     simd::{MAX_RUN, RUN_FIRST_BITS, Simd, packed_run},
 };
-use core::{error::Error, fmt, mem::MaybeUninit, ops::Range};
+use core::{error::Error, fmt, marker::PhantomData, mem::MaybeUninit, ops::Range, ptr};
 
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
@@ -21,23 +21,29 @@ pub(crate) const fn of_place(place: usize) -> Range<usize> {
     first..first + (place >> RUN_FIRST_BITS & (MAX_RUN - 1)) + 1
 }
 
-/// Leaves of up to 4 primitives, which are read from an `M`.
+/// Leaves of up to 4 primitives, which are read from an `M`, and known by a list of numbers or by their order.
 #[derive(Clone, Copy, Debug)]
-pub struct Runs<M>(M);
+pub struct Runs<M, O = ByList>(PhantomData<(M, O)>);
 
 /// Leaves of up to 4 primitives, of which the hierarchy knows the numbers alone. What they are is told to each query
 /// ([`Primitives`](crate::primitive::Primitives)); or, if they are triangles, to the hierarchy: [`Bvh::over`].
 pub type RunLeaf = Runs<()>;
 /// Leaves of up to 4 triangles of a mesh, which are read where the mesh has them.
 pub type MeshLeaf<'m> = Runs<TriangleMesh<'m>>;
+/// As [`RunLeaf`], of primitives that are in the order of leaves: so there are no numbers to be known. [`Bvh::reorder`]
+/// makes such.
+pub type OrderedLeaf = Runs<(), InOrder>;
+/// As [`MeshLeaf`], of triangles that are in the order of leaves.
+pub type OrderedMeshLeaf<'m> = Runs<TriangleMesh<'m>, InOrder>;
 
 /// A leaf of a run.
 #[doc(hidden)]
 #[derive(Clone, Copy)]
-pub struct Run<'a, M> {
+pub struct Run<'a, M, O> {
     of: M,
     primitives: &'a [u32],
     place: u32,
+    order: PhantomData<O>,
 }
 
 /// What leaves' primitives are read from.
@@ -45,8 +51,13 @@ pub struct Run<'a, M> {
 pub trait Numbered {
     /// How many there are, if that is known.
     fn count(&self) -> Option<usize>;
-    /// Has one fetched, if it is to be read here.
-    fn fetch<T: Simd>(&self, token: T, number: u32);
+    /// Where one is, if it is to be read here.
+    fn address(&self, number: u32) -> *const u8;
+    /// Has fetched what one is made of.
+    ///
+    /// # Safety
+    /// There is such a one.
+    unsafe fn fetch_parts<T: Simd>(&self, token: T, number: usize);
 }
 
 impl Numbered for () {
@@ -54,7 +65,13 @@ impl Numbered for () {
         None
     }
 
-    fn fetch<T: Simd>(&self, _: T, _: u32) {}
+    #[inline(always)]
+    fn address(&self, _: u32) -> *const u8 {
+        ptr::null()
+    }
+
+    #[inline(always)]
+    unsafe fn fetch_parts<T: Simd>(&self, _: T, _: usize) {}
 }
 
 impl Numbered for TriangleMesh<'_> {
@@ -63,15 +80,25 @@ impl Numbered for TriangleMesh<'_> {
     }
 
     #[inline(always)]
-    fn fetch<T: Simd>(&self, token: T, number: u32) {
-        let triangle = self.indices().as_ptr().wrapping_add(number as usize);
-        token.prefetch_line(triangle.cast());
+    fn address(&self, number: u32) -> *const u8 {
+        let indices = self.indices().as_ptr();
+        indices.wrapping_add(number as usize).cast()
+    }
+
+    #[inline(always)]
+    unsafe fn fetch_parts<T: Simd>(&self, token: T, number: usize) {
+        // SAFETY: the caller's promise.
+        let vertices = unsafe { self.indices().get_unchecked(number) };
+        for &vertex in vertices {
+            let positions = self.positions().as_ptr();
+            token.prefetch_line(positions.wrapping_add(vertex as usize).cast());
+        }
     }
 }
 
-impl<M: Copy + Numbered> Leaves for Runs<M> {
-    type Store<S: Storage> = M;
-    type Ref<'a> = Run<'a, M>;
+impl<M: Part + Numbered, O: Order> Leaves for Runs<M, O> {
+    type Store<S: Storage> = O::Over<M>;
+    type Ref<'a> = Run<'a, M, O>;
 
     #[inline(always)]
     fn span(place: usize) -> Range<usize> {
@@ -84,80 +111,117 @@ impl<M: Copy + Numbered> Leaves for Runs<M> {
             .then(|| packed_run(0, count as u32))
     }
 
-    fn count<S: Storage>(_: &M, primitives: &[u32]) -> Result<usize, LayoutError> {
-        match primitives.len() {
+    #[inline(always)]
+    fn len<S: Storage>(over: &O::Over<M>, primitives: &[u32]) -> usize {
+        O::len(over, primitives)
+    }
+
+    fn count<S: Storage>(over: &O::Over<M>, primitives: &[u32]) -> Result<usize, LayoutError> {
+        match O::len(over, primitives) {
             count if count < FIRST as usize => Ok(count),
             _ => Err(LayoutError::TooLarge),
         }
     }
 
-    fn numbers(primitives: &[u32]) -> u64 {
+    fn numbers<S: Storage>(over: &O::Over<M>, primitives: &[u32]) -> u64 {
+        if !O::LISTED {
+            return O::len(over, primitives) as u64;
+        }
         let greatest = primitives.iter().max();
         greatest.map_or(0, |&number| u64::from(number) + 1)
     }
 
-    fn known<S: Storage>(of: &M) -> Option<usize> {
-        of.count()
+    fn known<S: Storage>(over: &O::Over<M>) -> Option<usize> {
+        O::of(over).count()
     }
 
-    fn borrowed<S: Storage>(of: &M) -> M {
-        *of
+    fn unknown<S: Storage>(over: &O::Over<M>, primitives: &[u32]) -> Option<usize> {
+        let known = O::of(over).count()?;
+        if O::LISTED {
+            return primitives.iter().position(|&id| id as usize >= known);
+        }
+        (O::len(over, primitives) > known).then_some(known)
+    }
+
+    fn borrowed<S: Storage>(over: &O::Over<M>) -> O::Over<M> {
+        *over
     }
 
     #[cfg(feature = "alloc")]
-    fn owned<S: Storage>(of: &M) -> M {
-        *of
+    fn owned<S: Storage>(over: &O::Over<M>) -> O::Over<M> {
+        *over
     }
 
-    fn bytes<S: Storage>(_: &M) -> usize {
+    fn bytes<S: Storage>(_: &O::Over<M>) -> usize {
         0
     }
 
     #[inline(always)]
-    unsafe fn at<'a, S: Storage>(of: &'a M, primitives: &'a [u32], place: usize) -> Run<'a, M> {
+    unsafe fn at<'a, S: Storage>(
+        over: &'a O::Over<M>,
+        primitives: &'a [u32],
+        place: usize,
+    ) -> Run<'a, M, O> {
         Run {
-            of: *of,
+            of: *O::of(over),
             primitives,
             place: place as u32,
+            order: PhantomData,
         }
     }
 
     #[inline(always)]
-    fn address<S: Storage>(_: &M, primitives: &[u32], place: usize) -> *const u8 {
-        let first = place & FIRST as usize;
-        primitives.as_ptr().wrapping_add(first).cast()
+    fn address<S: Storage>(over: &O::Over<M>, primitives: &[u32], place: usize) -> *const u8 {
+        let first = place as u32 & FIRST;
+        if O::LISTED {
+            primitives.as_ptr().wrapping_add(first as usize).cast()
+        } else {
+            O::of(over).address(first)
+        }
     }
 
     #[inline(always)]
-    unsafe fn fetch_next<T: Simd, S: Storage>(token: T, of: &M, primitives: &[u32], place: usize) {
+    unsafe fn fetch_next<T: Simd, S: Storage>(
+        token: T,
+        over: &O::Over<M>,
+        primitives: &[u32],
+        place: usize,
+    ) {
         for place in of_place(place) {
-            // SAFETY: the caller's promise: the run is within the list.
-            of.fetch(token, unsafe { *primitives.get_unchecked(place) });
+            // SAFETY: the caller's promise: the run is within the list, or of primitives that are there.
+            unsafe {
+                if O::LISTED {
+                    let number = *primitives.get_unchecked(place);
+                    token.prefetch_line(O::of(over).address(number));
+                } else {
+                    O::of(over).fetch_parts(token, place);
+                }
+            }
         }
     }
 
     #[inline(always)]
-    fn primitives(leaf: Run<M>) -> usize {
+    fn primitives(leaf: Run<M, O>) -> usize {
         leaf.range().len()
     }
 }
 
-impl<M> Run<'_, M> {
-    /// Its places in the list.
+impl<M, O> Run<'_, M, O> {
+    /// The places of its primitives.
     #[inline(always)]
     pub(crate) fn range(&self) -> Range<usize> {
         of_place(self.place as usize)
     }
 }
 
-impl Listed for Run<'_, ()> {
+impl Listed for Run<'_, (), ByList> {
     #[inline(always)]
     fn places(self) -> Range<usize> {
         self.range()
     }
 }
 
-impl Triangles for Run<'_, TriangleMesh<'_>> {
+impl<O: Order> Triangles for Run<'_, TriangleMesh<'_>, O> {
     type Precision = Exact;
     in_lanes!(four);
 
@@ -198,7 +262,7 @@ impl Triangles for Run<'_, TriangleMesh<'_>> {
     }
 }
 
-impl Gather for Run<'_, TriangleMesh<'_>> {
+impl<O: Order> Gather for Run<'_, TriangleMesh<'_>, O> {
     type Gathered<'a> = &'a TriangleLeaf;
 
     #[inline(always)]
@@ -215,16 +279,20 @@ impl Gather for Run<'_, TriangleMesh<'_>> {
     }
 }
 
-impl<'a> Run<'a, TriangleMesh<'a>> {
+impl<'a, O: Order> Run<'a, TriangleMesh<'a>, O> {
     /// The vertices of the triangle in a lane; past the last, its.
     #[inline(always)]
     fn vertices(&self, lane: usize) -> &'a [u32; 3] {
         let Range { start, end } = self.range();
-        // SAFETY: the layout's check saw that the run is within the list, and, as `over` has, that every number of the
-        // list is within the mesh.
+        let place = (start + lane).min(end - 1);
+        // SAFETY: the layout's check saw that the run is within the list, if there is one, and, as `over` has, that every
+        // number is within the mesh.
         unsafe {
-            let number = *self.primitives.get_unchecked((start + lane).min(end - 1));
-            self.of.indices().get_unchecked(number as usize)
+            let number = match O::LISTED {
+                true => *self.primitives.get_unchecked(place) as usize,
+                false => place,
+            };
+            self.of.indices().get_unchecked(number)
         }
     }
 
@@ -263,7 +331,7 @@ impl<'a> Run<'a, TriangleMesh<'a>> {
     }
 }
 
-impl<N: WideNode, S: Storage> Bvh<N, RunLeaf, S> {
+impl<N: WideNode, O: Order, S: Storage> Bvh<N, Runs<(), O>, S> {
     /// The hierarchy over the triangles of `mesh`, which is the one that it was built on.
     ///
     /// Of another mesh, queries find what they find: some of its triangles, no more.
@@ -273,21 +341,21 @@ impl<N: WideNode, S: Storage> Bvh<N, RunLeaf, S> {
     pub fn over<'a>(
         &'a self,
         mesh: &TriangleMesh<'a>,
-    ) -> Result<Bvh<N, MeshLeaf<'a>, Borrowed<'a>>, MeshTooSmall> {
+    ) -> Result<Bvh<N, Runs<TriangleMesh<'a>, O>, Borrowed<'a>>, MeshTooSmall> {
         if self.numbers > mesh.len() as u64 {
             return Err(MeshTooSmall {
                 triangles: mesh.len(),
                 needed: self.numbers,
             });
         }
-        Ok(self.with_leaves(*mesh))
+        Ok(self.with_leaves(O::with(self.leaf_store(), *mesh)))
     }
 }
 
-impl<'m, N: WideNode, S: Storage> Bvh<N, MeshLeaf<'m>, S> {
+impl<'m, N: WideNode, O: Order, S: Storage> Bvh<N, Runs<TriangleMesh<'m>, O>, S> {
     /// The mesh whose triangles these are.
     pub fn mesh(&self) -> &TriangleMesh<'m> {
-        self.leaf_store()
+        O::of(self.leaf_store())
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode},
+    layout::{Bvh, Storage, TriangleLeaves, Triangles, WideNode, number_at},
     primitive::triangle::{RayShear, TriangleHits, Where, bits},
     simd::{Lanes, Operation, Simd},
     slab::{NarrowRay, PreparedRay},
@@ -132,7 +132,9 @@ impl Found {
         primitives: &[u32],
     ) -> bool {
         let closer = best.is_none_or(|best| {
-            self.t < best.t || self.t == best.t && primitives[self.place] < primitives[best.place]
+            self.t < best.t
+                || self.t == best.t
+                    && number_at(primitives, self.place) < number_at(primitives, best.place)
         });
         if closer {
             *t_max = self.t;
@@ -148,7 +150,7 @@ impl Found {
             t,
             u: self.u,
             v: self.v,
-            primitive: primitives[self.place],
+            primitive: number_at(primitives, self.place),
         }
     }
 }

@@ -15,7 +15,9 @@ pub(in crate::layout) const TRIANGLE_LEAVES: u32 = 1;
 /// Leaves of [`PrimitiveLeaf`](crate::layout::PrimitiveLeaf).
 pub(in crate::layout) const PRIMITIVE_LEAVES: u32 = 2;
 /// Leaves that are runs of the list of primitive numbers.
-pub(super) const RUNS: u32 = 3;
+pub(in crate::layout) const RUNS: u32 = 3;
+/// Leaves that are runs of primitives in their order: there is no list.
+pub(in crate::layout) const ORDERED_RUNS: u32 = 4;
 
 /// The first 128 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -27,11 +29,11 @@ pub struct Header {
     version: u32,
     /// 1 to 4: of 4 children, of 8, compact of 4, compact of 8.
     pub node_kind: u32,
-    /// 1 to 3: of triangles, of a caller's primitives, runs.
+    /// 1 to 4: of triangles, of a caller's primitives, runs of the list of numbers, runs of primitives in their order.
     pub leaf_kind: u32,
     nodes: u32,
     leaves: u32,
-    primitives: u32,
+    pub(super) primitives: u32,
     positions: u32,
     triangles: u32,
     pub(super) dropped: u32,
@@ -68,7 +70,7 @@ impl Header {
             leaf_kind: L::KIND,
             nodes: bvh.nodes().len() as u32,
             leaves: leaves as u32,
-            primitives: bvh.primitives().len() as u32,
+            primitives: bvh.primitive_count() as u32,
             positions: u32::try_from(positions).map_err(|_| BytesError::TooMany("positions"))?,
             triangles: triangles as u32,
             dropped: bvh.dropped() as u32,
@@ -157,7 +159,7 @@ impl Header {
         let lengths = [
             u64::from(self.nodes) * size_of::<N>() as u64,
             u64::from(self.leaves) * L::SIZE as u64,
-            u64::from(self.primitives) * 4,
+            u64::from(self.primitives) * if L::LISTED { 4 } else { 0 },
             u64::from(self.positions) * 12,
             u64::from(self.triangles) * 12,
         ];

@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | nodes | [`Node4`](super::Node4), [`Node8`](super::Node8), [`CompactNode4`](super::CompactNode4) or [`CompactNode8`](super::CompactNode8) |
 //! | leaves | [`TriangleLeaf`](super::TriangleLeaf) or [`PrimitiveLeaf`](super::PrimitiveLeaf); none if leaves are runs |
-//! | primitives | numbers of primitives, 4 bytes each |
+//! | primitives | numbers of primitives, 4 bytes each; none if leaves are runs of primitives in their order |
 //! | positions | of a mesh's vertices, 12 bytes each; none without a mesh |
 //! | indices | three corners of 4 bytes each, as places of positions |
 
@@ -23,16 +23,20 @@ pub use aligned::AlignedBytes;
 pub use checksum::seal;
 pub use error::BytesError;
 pub use header::Header;
-pub(super) use header::{PRIMITIVE_LEAVES, TRIANGLE_LEAVES};
+pub(super) use header::{ORDERED_RUNS, PRIMITIVE_LEAVES, RUNS, TRIANGLE_LEAVES};
 
 use super::{
-    Borrowed, Bvh, LayoutError, Leaf, Leaves, MeshLeaf, MeshTooSmall, RunLeaf, Storage, WideNode,
+    Borrowed, Bvh, LayoutError, Leaf, Leaves, MeshTooSmall, Order, Runs, Storage, WideNode,
 };
 use crate::geometry::TriangleMesh;
 use bytemuck::{Pod, cast_slice};
 
 /// Every section starts at a multiple of this, of bytes from the first.
 pub const ALIGN: usize = 64;
+
+/// What there is to write beside nodes and numbers: leaves, and of a mesh the positions and indices.
+#[doc(hidden)]
+pub type Sections<'a> = (&'a [u8], &'a [[f32; 3]], &'a [[u32; 3]]);
 
 /// Leaves that can be written.
 pub trait InBytes: Leaves {
@@ -48,19 +52,25 @@ pub trait InBytes: Leaves {
     /// Whether there may be a mesh.
     #[doc(hidden)]
     const MESH: bool = true;
-    /// What there is to write: the leaves, and of a mesh the positions and indices.
+    /// Whether there is a list of numbers.
     #[doc(hidden)]
-    fn sections<S: Storage>(store: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]);
+    const LISTED: bool = true;
+    /// What there is to write of them.
+    #[doc(hidden)]
+    fn sections<'a, S: Storage>(store: &'a Self::Store<S>) -> Sections<'a>
+    where
+        Self: 'a;
 }
 
 /// Leaves that can be read in place for as long as `'a`.
 pub trait Open<'a>: InBytes {
-    /// Over what was read.
+    /// Over what was read, of so many primitives.
     ///
     /// # Errors
     /// The mesh has an index out of range.
     #[doc(hidden)]
     fn open(
+        primitives: usize,
         leaves: &'a [u8],
         positions: &'a [[f32; 3]],
         indices: &'a [[u32; 3]],
@@ -73,48 +83,72 @@ impl<L: Leaf> InBytes for L {
     const ALIGN: usize = align_of::<L>();
     const MESH: bool = false;
 
-    fn sections<S: Storage>(store: &S::Slice<L>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+    fn sections<'a, S: Storage>(store: &'a S::Slice<L>) -> Sections<'a>
+    where
+        Self: 'a,
+    {
         (cast_slice(store), &[], &[])
     }
 }
 
 impl<'a, L: Leaf> Open<'a> for L {
-    fn open(leaves: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<&'a [L], BytesError> {
+    fn open(
+        _: usize,
+        leaves: &'a [u8],
+        _: &'a [[f32; 3]],
+        _: &'a [[u32; 3]],
+    ) -> Result<&'a [L], BytesError> {
         cast(leaves)
     }
 }
 
-impl InBytes for RunLeaf {
-    const KIND: u32 = header::RUNS;
+impl<O: Order> InBytes for Runs<(), O> {
+    const KIND: u32 = O::KIND;
     const SIZE: usize = 0;
+    const LISTED: bool = O::LISTED;
 
-    fn sections<S: Storage>((): &()) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+    fn sections<'a, S: Storage>(_: &'a Self::Store<S>) -> Sections<'a>
+    where
+        Self: 'a,
+    {
         (&[], &[], &[])
     }
 }
 
-impl<'a> Open<'a> for RunLeaf {
-    fn open(_: &'a [u8], _: &'a [[f32; 3]], _: &'a [[u32; 3]]) -> Result<(), BytesError> {
-        Ok(())
+impl<'a, O: Order> Open<'a> for Runs<(), O> {
+    fn open(
+        primitives: usize,
+        _: &'a [u8],
+        _: &'a [[f32; 3]],
+        _: &'a [[u32; 3]],
+    ) -> Result<O::Over<()>, BytesError> {
+        Ok(O::counted((), primitives))
     }
 }
 
-impl InBytes for MeshLeaf<'_> {
-    const KIND: u32 = header::RUNS;
+impl<O: Order> InBytes for Runs<TriangleMesh<'_>, O> {
+    const KIND: u32 = O::KIND;
     const SIZE: usize = 0;
+    const LISTED: bool = O::LISTED;
 
-    fn sections<S: Storage>(mesh: &Self::Store<S>) -> (&[u8], &[[f32; 3]], &[[u32; 3]]) {
+    fn sections<'a, S: Storage>(over: &'a Self::Store<S>) -> Sections<'a>
+    where
+        Self: 'a,
+    {
+        let mesh = O::of(over);
         (&[], mesh.positions(), mesh.indices())
     }
 }
 
-impl<'a> Open<'a> for MeshLeaf<'a> {
+impl<'a, O: Order> Open<'a> for Runs<TriangleMesh<'a>, O> {
     fn open(
+        primitives: usize,
         _: &'a [u8],
         positions: &'a [[f32; 3]],
         indices: &'a [[u32; 3]],
-    ) -> Result<TriangleMesh<'a>, BytesError> {
-        Ok(TriangleMesh::new(positions, indices)?)
+    ) -> Result<O::Over<TriangleMesh<'a>>, BytesError> {
+        let mesh = TriangleMesh::new(positions, indices)?;
+        Ok(O::counted(mesh, primitives))
     }
 }
 
@@ -138,17 +172,18 @@ impl<'a, N: WideNode, L: Open<'a>> Bvh<N, L, Borrowed<'a>> {
         let [nodes, leaves, primitives, positions, indices] = header.sections::<N, L>(bytes)?;
         checksum::check(bytes)?;
         let store = L::open(
+            header.primitives as usize,
             &bytes[leaves],
             cast(&bytes[positions])?,
             cast(&bytes[indices])?,
         )?;
         let primitives = cast(&bytes[primitives])?;
         let known = L::known::<Borrowed>(&store);
+        let needed = L::numbers::<Borrowed>(&store, primitives);
         let bvh = Self::from_parts(cast(&bytes[nodes])?, store, primitives, header.bounds());
         match (bvh, known) {
             (Ok(bvh), _) => Ok(bvh.with_dropped(header.dropped)),
             (Err(LayoutError::Primitive(_)), Some(triangles)) => {
-                let needed = L::numbers(primitives);
                 Err(MeshTooSmall { triangles, needed }.into())
             }
             (Err(error), _) => Err(error.into()),

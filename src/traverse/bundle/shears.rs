@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Ray,
-    layout::{Gathered, Triangles},
+    layout::{Gathered, Triangles, number_at},
     primitive::{
         exact::{Pair, Pairs},
         triangle::{Along, Edges, Sheared, Where, Whether, bits},
@@ -146,7 +146,8 @@ impl<const LANES: usize, V: Vector<LANES>> Shears<LANES, V> {
             for lane in bits(hits.mask & !nearer) {
                 // As near as the best one: the lesser number.
                 let best = self.places.to_array()[lane % LANES].to_bits() as usize;
-                closer |= u32::from(primitives[place] < primitives[best]) << lane;
+                let is_less = number_at(primitives, place) < number_at(primitives, best);
+                closer |= u32::from(is_less) << lane;
             }
             let set = V::of_bits(token, closer);
             self.t_max = set.select(hits.t, self.t_max);

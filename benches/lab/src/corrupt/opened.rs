@@ -1,10 +1,10 @@
 //! Baked files of triangles, opened as what they say they are.
 
 use wide_bvh::{
-    geometry::{Aabb, Hit, Ray},
+    geometry::{Aabb, Hit, Ray, TriangleMesh},
     layout::{
-        Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, MeshLeaf, Node4, Node8, Storage,
-        TriangleLeaf, TriangleLeaves, WideNode, bytes::Header,
+        Borrowed, Bvh, ByList, BytesError, CompactNode4, CompactNode8, InOrder, Node4, Node8,
+        Order, Runs, Storage, TriangleLeaf, TriangleLeaves, WideNode, bytes::Header,
     },
     simd::Backend,
 };
@@ -35,10 +35,14 @@ pub fn opener(header: &Header) -> Option<Open> {
     match (header.node_kind, header.leaf_kind) {
         (1, 1) => Some(leaves::<Node4>),
         (2, 1) => Some(leaves::<Node8>),
-        (1, 3) => Some(runs::<Node4>),
-        (2, 3) => Some(runs::<Node8>),
-        (3, 3) => Some(runs::<CompactNode4>),
-        (4, 3) => Some(runs::<CompactNode8>),
+        (1, 3) => Some(runs::<Node4, ByList>),
+        (2, 3) => Some(runs::<Node8, ByList>),
+        (3, 3) => Some(runs::<CompactNode4, ByList>),
+        (4, 3) => Some(runs::<CompactNode8, ByList>),
+        (1, 4) => Some(runs::<Node4, InOrder>),
+        (2, 4) => Some(runs::<Node8, InOrder>),
+        (3, 4) => Some(runs::<CompactNode4, InOrder>),
+        (4, 4) => Some(runs::<CompactNode8, InOrder>),
         _ => None,
     }
 }
@@ -49,8 +53,11 @@ fn leaves<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened 
     Ok(Box::new(bvh))
 }
 
-fn runs<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened + '_>, BytesError> {
-    let mut bvh = Bvh::<N, MeshLeaf, Borrowed>::from_bytes(bytes)?;
+fn runs<N: WideNode, O: Order + 'static>(
+    bytes: &[u8],
+    backend: Backend,
+) -> Result<Box<dyn Opened + '_>, BytesError> {
+    let mut bvh = Bvh::<N, Runs<TriangleMesh, O>, Borrowed>::from_bytes(bytes)?;
     bvh.set_backend(backend);
     Ok(Box::new(bvh))
 }

@@ -8,7 +8,10 @@ use std::{error::Error, marker::PhantomData, rc::Rc};
 use wide_bvh::{
     build::{Builder, ReorderedMesh},
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Borrowed, Bvh, CompactNode4, CompactNode8, MeshLeaf, Owned, RunLeaf, WideNode},
+    layout::{
+        Borrowed, Bvh, CompactNode4, CompactNode8, Order, OrderedLeaf, Owned, RunLeaf, Runs,
+        WideNode,
+    },
     simd::Backend,
 };
 
@@ -48,18 +51,18 @@ fn of_order<'m, N: WideNode + Send + 'm>(
         return Ok(Vec::new());
     }
     let build = || -> Result<_, Box<dyn Error + Send + Sync>> {
-        let mut tree = Builder::new().build_compact::<N>(mesh)?;
-        let reordered = reorder.then(|| tree.reorder(mesh)).transpose()?;
-        Ok((tree, reordered))
+        let tree = Builder::new().build_compact::<N>(mesh)?;
+        Ok(match reorder {
+            true => {
+                let (tree, reordered) = tree.reorder(mesh)?;
+                Tree::InOrder(tree, reordered)
+            }
+            false => Tree::ByList(tree, *mesh),
+        })
     };
     let (built, time) = pool(1)?.install(|| timed(build));
-    let (tree, reordered) = built.map_err(|error| -> Box<dyn Error> { error })?;
+    let tree = Rc::new(built.map_err(|error| -> Box<dyn Error> { error })?);
     let bytes = tree.bytes();
-    let tree = Rc::new(Tree {
-        tree,
-        mesh: *mesh,
-        reordered,
-    });
     let built = Built { time, bytes };
     let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree));
     Ok(kinds.into_iter().map(engine).collect())
@@ -69,12 +72,28 @@ fn of_order<'m, N: WideNode + Send + 'm>(
 type Make<'m, N> = fn(String, Built, Rc<Tree<'m, N>>) -> Box<dyn Engine + 'm>;
 
 /// A tree, which both calls share.
-struct Tree<'m, N: WideNode> {
-    tree: Bvh<N, RunLeaf, Owned>,
-    /// As it was.
-    mesh: TriangleMesh<'m>,
-    /// As the tree has it, if that is another.
-    reordered: Option<ReorderedMesh>,
+enum Tree<'m, N: WideNode> {
+    /// Over the mesh as it was.
+    ByList(Bvh<N, RunLeaf, Owned>, TriangleMesh<'m>),
+    /// Over one in the order of leaves.
+    InOrder(Bvh<N, OrderedLeaf, Owned>, ReorderedMesh),
+}
+
+impl<N: WideNode> Tree<'_, N> {
+    /// What there is beside the mesh: triangles that are in a reordered one more than once, too.
+    fn bytes(&self) -> usize {
+        match self {
+            Self::ByList(tree, _) => tree.bytes(),
+            Self::InOrder(tree, new) => {
+                let numbers = new
+                    .triangles
+                    .iter()
+                    .max()
+                    .map_or(0, |&last| last as usize + 1);
+                tree.bytes() + size_of_val(&new.indices[numbers..])
+            }
+        }
+    }
 }
 
 /// A tree and how it is called.
@@ -107,7 +126,7 @@ impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
 
     /// Of triangles that are hit at one `t` the one of least number is another where numbers are.
     fn is_exact(&self) -> bool {
-        self.tree.reordered.is_none()
+        matches!(*self.tree, Tree::ByList(..))
     }
 
     fn takes(&self) -> Takes {
@@ -115,36 +134,35 @@ impl<N: WideNode, C: Call> Engine for Compact<'_, N, C> {
     }
 
     fn prepare<'a>(&'a self, rays: &'a [Ray]) -> Box<dyn Batch + 'a> {
-        let Tree {
-            tree,
-            mesh,
-            reordered,
-        } = &*self.tree;
-        let (mesh, numbers) = match reordered {
-            None => (*mesh, None),
-            Some(new) => {
-                let mesh = TriangleMesh::new(&new.positions, &new.indices);
-                (mesh.expect("a mesh"), Some(&*new.triangles))
+        match &*self.tree {
+            Tree::ByList(tree, mesh) => Box::new(Rays {
+                bvh: tree.over(mesh).expect("the mesh that it was built on"),
+                numbers: None,
+                rays,
+                call: PhantomData::<C>,
+            }),
+            Tree::InOrder(tree, new) => {
+                let mesh = TriangleMesh::new(&new.positions, &new.indices).expect("a mesh");
+                Box::new(Rays {
+                    bvh: tree.over(&mesh).expect("the mesh that it is over"),
+                    numbers: Some(&*new.triangles),
+                    rays,
+                    call: PhantomData::<C>,
+                })
             }
-        };
-        Box::new(Rays {
-            bvh: tree.over(&mesh).expect("the mesh that it was built on"),
-            numbers,
-            rays,
-            call: PhantomData::<C>,
-        })
+        }
     }
 }
 
-struct Rays<'a, N: WideNode, C> {
-    bvh: Bvh<N, MeshLeaf<'a>, Borrowed<'a>>,
+struct Rays<'a, N: WideNode, O: Order, C> {
+    bvh: Bvh<N, Runs<TriangleMesh<'a>, O>, Borrowed<'a>>,
     /// The numbers that triangles had, if they have others.
     numbers: Option<&'a [u32]>,
     rays: &'a [Ray],
     call: PhantomData<C>,
 }
 
-impl<N: WideNode, C: Call> Batch for Rays<'_, N, C> {
+impl<N: WideNode, O: Order, C: Call> Batch for Rays<'_, N, O, C> {
     fn closest(&self, hits: &mut [Option<Hit>]) {
         C::closest(&self.bvh, self.rays, hits);
         if let Some(numbers) = self.numbers {
