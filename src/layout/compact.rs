@@ -50,6 +50,9 @@ pub trait Head: Pod + Debug {
     /// The same after so many other nodes and primitives.
     #[doc(hidden)]
     fn after(&self, nodes: u32, units: u32) -> Self;
+    /// The place of the first primitive.
+    #[doc(hidden)]
+    fn first_leaf(&self) -> usize;
     /// How many children there are; of a node that is none, less than 16.
     #[doc(hidden)]
     fn children(&self, more: u8) -> usize;
@@ -99,6 +102,11 @@ impl Head for Head8 {
             units: self.units.wrapping_add(units),
             ends: self.ends,
         }
+    }
+
+    #[inline(always)]
+    fn first_leaf(&self) -> usize {
+        self.units as usize
     }
 
     #[inline(always)]
@@ -166,6 +174,11 @@ impl Head for Head4 {
             nodes: after(self.nodes, nodes),
             units: after(self.units, units),
         }
+    }
+
+    #[inline(always)]
+    fn first_leaf(&self) -> usize {
+        (self.units & Self::PLACE) as usize
     }
 
     #[inline(always)]
@@ -251,6 +264,11 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
             .head
             .after(if first { 0 } else { nodes }, if last { leaves } else { 0 });
         Self { head, ..*self }
+    }
+
+    #[inline(always)]
+    fn first_leaf(&self) -> Option<usize> {
+        Some(self.head.first_leaf())
     }
 
     /// How many lanes have a child.

@@ -82,6 +82,11 @@ impl<const W: usize, A> Node<W, A> {
         )
     }
 
+    #[inline(always)]
+    fn first_leaf(&self) -> Option<usize> {
+        None
+    }
+
     /// Those without a child say so themselves.
     #[inline(always)]
     fn lanes(&self) -> usize {
