@@ -170,6 +170,14 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
+    /// Has the leaves fetched that a node leads to, the first of them, if they are side by side.
+    #[inline(always)]
+    pub(crate) fn prefetch_leaves<T: Simd>(&self, token: T, node: &N) {
+        if let Some(place) = node.first_leaf() {
+            token.prefetch(self.leaf_address(place));
+        }
+    }
+
     /// The node that a link leads to.
     ///
     /// # Safety

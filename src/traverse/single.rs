@@ -99,9 +99,7 @@ pub(super) fn walk_boxes<
             if fetches {
                 // Read when it is known which, too late to wait for a line that the boxes were not in.
                 N::prefetch_links(token, ptr::from_ref(node).cast());
-                if let Some(place) = node.first_leaf() {
-                    token.prefetch(bvh.leaf_address(place));
-                }
+                bvh.prefetch_leaves(token, node);
             }
             let (mask, near) = boxes.test(node, t_max);
             if mask == 0 {

@@ -316,10 +316,16 @@ impl<'a, const LANES: usize, V: Vector<LANES>> Bundle<'a, LANES, V> {
                 // SAFETY: the layout's check saw that all leaves led to are there.
                 let leaf = unsafe { bvh.leaf(current.leaf()) };
                 self.test_leaf::<Q>(token, leaf, bvh.primitives(), rays);
-            } else if rays.count_ones() <= few {
-                self.test_one_by_one::<N, L, S, Q>(token, bvh, current, rays, &mut ways, &mut len);
             } else {
-                self.test_together(token, bvh, current, rays, &mut ways, &mut len);
+                // SAFETY: the layout's check saw that all nodes led to are there.
+                bvh.prefetch_leaves(token, unsafe { bvh.node(current) });
+                if rays.count_ones() <= few {
+                    self.test_one_by_one::<N, L, S, Q>(
+                        token, bvh, current, rays, &mut ways, &mut len,
+                    );
+                } else {
+                    self.test_together(token, bvh, current, rays, &mut ways, &mut len);
+                }
             }
             // The last child left behind that any of its rays passes, with as near as they have come.
             loop {
