@@ -169,6 +169,10 @@ fn counts() {
     assert!(matches!(of(count - 1), Err(LayoutError::Child { .. })));
     assert_eq!(of(1 << 29), Err(LayoutError::TooLarge));
 
+    let listed =
+        OrderedBvh8::from_parts(nodes.to_vec(), Counted { of: (), count }, vec![7], bounds);
+    assert_eq!(listed.unwrap_err(), LayoutError::Listed(1));
+
     let needed = count as u64;
     let triangles = count - 1;
     let fewer = TriangleMesh::new(&new.positions, &new.indices[..triangles]).unwrap();

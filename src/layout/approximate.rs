@@ -22,6 +22,7 @@ pub struct ApproximateRef<R>(R);
 impl<L: TriangleLeaves> Leaves for Approximate<L> {
     type Store<S: Storage> = L::Store<S>;
     type Ref<'a> = ApproximateRef<L::Ref<'a>>;
+    const LISTED: bool = L::LISTED;
 
     #[inline(always)]
     fn span(place: usize) -> Range<usize> {

@@ -33,6 +33,8 @@ pub enum LayoutError {
     Leaf(usize),
     /// At this place of the list is the number of a triangle that the mesh has not.
     Primitive(usize),
+    /// There is a list of so many numbers, where primitives are in the order of leaves.
+    Listed(usize),
     /// The way to this node needs more stack than a walk has.
     TooDeep(usize),
     /// This many nodes are led to from the root, and there are more.
@@ -63,6 +65,9 @@ impl fmt::Display for LayoutError {
                     "primitive number at {place}: the mesh has no such triangle"
                 )
             }
+            Self::Listed(count) => {
+                write!(f, "a list of {count} numbers, where none is needed")
+            }
             Self::TooDeep(node) => write!(f, "node {node}: deeper than a walk's stack"),
             Self::UnusedNodes(used) => write!(f, "nothing leads to the nodes from {used} on"),
             Self::UnusedLeaves(used) => write!(f, "nothing leads to the leaves from {used} on"),
@@ -82,6 +87,9 @@ pub(super) fn check<N: WideNode, L: Leaves, S: Storage>(
     primitives: &[u32],
     bounds: &Aabb,
 ) -> Result<Child, LayoutError> {
+    if !L::LISTED && !primitives.is_empty() {
+        return Err(LayoutError::Listed(primitives.len()));
+    }
     let count = L::count::<S>(leaves, primitives)?;
     let root = root::<N, L>(nodes.len(), count, L::len::<S>(leaves, primitives))?;
     if let Some(place) = L::unknown::<S>(leaves, primitives) {

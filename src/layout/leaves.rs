@@ -19,6 +19,10 @@ pub trait Leaves: Sized {
     #[doc(hidden)]
     type Ref<'a>: Copy;
 
+    /// Whether there is a list of primitive numbers.
+    #[doc(hidden)]
+    const LISTED: bool = true;
+
     /// Which of what is counted a leaf at `place` takes up: leaves, or primitive numbers.
     #[doc(hidden)]
     fn span(place: usize) -> Range<usize>;

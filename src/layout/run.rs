@@ -99,6 +99,7 @@ impl Numbered for TriangleMesh<'_> {
 impl<M: Part + Numbered, O: Order> Leaves for Runs<M, O> {
     type Store<S: Storage> = O::Over<M>;
     type Ref<'a> = Run<'a, M, O>;
+    const LISTED: bool = O::LISTED;
 
     #[inline(always)]
     fn span(place: usize) -> Range<usize> {

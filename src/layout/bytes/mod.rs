@@ -52,9 +52,6 @@ pub trait InBytes: Leaves {
     /// Whether there may be a mesh.
     #[doc(hidden)]
     const MESH: bool = true;
-    /// Whether there is a list of numbers.
-    #[doc(hidden)]
-    const LISTED: bool = true;
     /// What there is to write of them.
     #[doc(hidden)]
     fn sections<'a, S: Storage>(store: &'a Self::Store<S>) -> Sections<'a>
@@ -105,7 +102,6 @@ impl<'a, L: Leaf> Open<'a> for L {
 impl<O: Order> InBytes for Runs<(), O> {
     const KIND: u32 = O::KIND;
     const SIZE: usize = 0;
-    const LISTED: bool = O::LISTED;
 
     fn sections<'a, S: Storage>(_: &'a Self::Store<S>) -> Sections<'a>
     where
@@ -129,7 +125,6 @@ impl<'a, O: Order> Open<'a> for Runs<(), O> {
 impl<O: Order> InBytes for Runs<TriangleMesh<'_>, O> {
     const KIND: u32 = O::KIND;
     const SIZE: usize = 0;
-    const LISTED: bool = O::LISTED;
 
     fn sections<'a, S: Storage>(over: &'a Self::Store<S>) -> Sections<'a>
     where
