@@ -26,8 +26,9 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
     /// numbers, less than half of the bytes.
     ///
     /// A compact hierarchy's leaves read the mesh where it is. If what is close together in space is far apart there, each
-    /// triangle is in cache lines of its own, which are found by its number and that by the list's. Where the mesh is much
-    /// larger than the caches rays are the faster for it, and for the large pages that the new buffers are on.
+    /// triangle is in cache lines of its own, which are found by its number, and that in the list. Where the mesh is much
+    /// larger than the caches rays are the faster for it, and for the large pages that the new buffers are on: twice as fast over
+    /// ten million triangles that were in no good order, 4 to 8 % over those of a hundred thousand (Intel).
     ///
     /// A triangle that was cut, and is in several leaves, is in the new mesh as often. [`splits(0.0)`](super::Builder::splits)
     /// makes none of those.
