@@ -227,10 +227,10 @@ fn bytes(input: &Input, mesh: &Mesh) -> (Vec<u8>, bool) {
 }
 
 /// Which leaves a file has: 1 is those over boxes, 4 and 5 are over the mesh in their order, the others over the mesh. Compact
-/// nodes have no 0.
+/// nodes have no 0, others no 4 and 5.
 fn kind_of_leaves(nodes: u8, leaves: u8) -> u8 {
     match nodes % 4 {
-        0 | 1 => leaves % 6,
+        0 | 1 => leaves % 4,
         _ => (leaves % 6).max(1),
     }
 }

@@ -39,8 +39,6 @@ pub fn opener(header: &Header) -> Option<Open> {
         (2, 3) => Some(runs::<Node8, ByList>),
         (3, 3) => Some(runs::<CompactNode4, ByList>),
         (4, 3) => Some(runs::<CompactNode8, ByList>),
-        (1, 4) => Some(runs::<Node4, InOrder>),
-        (2, 4) => Some(runs::<Node8, InOrder>),
         (3, 4) => Some(runs::<CompactNode4, InOrder>),
         (4, 4) => Some(runs::<CompactNode8, InOrder>),
         _ => None,
