@@ -89,7 +89,7 @@ fn of_parts(nodes: u8, leaves: u8, bounds: [f32; 6], sections: &[Vec<u8>; 5]) ->
     bytes.resize(size_of::<Header>(), 0);
     let mut put = |at: usize, word: u32| bytes[at..at + 4].copy_from_slice(&word.to_ne_bytes());
     put(8, 0x0102_0304);
-    put(12, 2);
+    put(12, Header::VERSION);
     put(16, u32::from(nodes % 4) + 1);
     put(20, u32::from(leaves % 4) + 1);
     let sizes = sizes(nodes, leaves);

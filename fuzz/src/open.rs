@@ -25,8 +25,8 @@ pub struct Opened {
     pub count: usize,
 }
 
-/// Opens bytes as every kind of nodes with every kind of leaves that go with them, and asks what opens. `mesh` is what leaves are put over
-/// that have none of their own; `boxes` are a caller's primitives.
+/// Opens bytes as every kind of nodes with every kind of leaves that go with them, and asks what opens. `mesh` is what leaves
+/// are put over that have none of their own; `boxes` are a caller's primitives.
 ///
 /// One outcome for each kind, always in the same order.
 pub fn open(

@@ -248,10 +248,20 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         &'a self,
         leaves: K::Store<Borrowed<'a>>,
     ) -> Bvh<N, K, Borrowed<'a>> {
+        self.with_parts(self.nodes(), leaves, self.primitives())
+    }
+
+    /// The same hierarchy of other parts.
+    fn with_parts<K: Leaves, T: Storage>(
+        &self,
+        nodes: T::Slice<N>,
+        leaves: K::Store<T>,
+        primitives: T::Slice<u32>,
+    ) -> Bvh<N, K, T> {
         Bvh {
-            nodes: &self.nodes,
+            nodes,
             leaves,
-            primitives: &self.primitives,
+            primitives,
             numbers: self.numbers,
             root: self.root,
             bounds: self.bounds,
@@ -269,16 +279,8 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// [refitted](Bvh::refit).
     #[cfg(feature = "alloc")]
     pub fn into_owned(self) -> Bvh<N, L, super::Owned> {
-        Bvh {
-            nodes: self.nodes.to_vec(),
-            leaves: L::owned::<S>(&self.leaves),
-            primitives: self.primitives.to_vec(),
-            numbers: self.numbers,
-            root: self.root,
-            bounds: self.bounds,
-            backend: self.backend,
-            dropped: self.dropped,
-        }
+        let leaves = L::owned::<S>(&self.leaves);
+        self.with_parts(self.nodes.to_vec(), leaves, self.primitives.to_vec())
     }
 
     /// How many bytes nodes, leaves and primitive numbers take: what there is beside the primitives, or the mesh, of a
@@ -337,14 +339,8 @@ impl<N: WideNode> Bvh<N, RunLeaf, crate::layout::Owned> {
     ) -> Bvh<N, OrderedLeaf, crate::layout::Owned> {
         let count = self.primitive_count();
         Bvh {
-            nodes,
-            leaves: Counted { of: (), count },
-            primitives: alloc::vec::Vec::new(),
             numbers: count as u64,
-            root: self.root,
-            bounds: self.bounds,
-            backend: self.backend,
-            dropped: self.dropped,
+            ..self.with_parts(nodes, Counted { of: (), count }, alloc::vec::Vec::new())
         }
     }
 }

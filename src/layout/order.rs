@@ -19,9 +19,6 @@ pub trait Order: Copy + Debug + sealed::Sealed {
     /// How many there are.
     #[doc(hidden)]
     fn len<M: Part>(over: &Self::Over<M>, primitives: &[u32]) -> usize;
-    /// The same over something else.
-    #[doc(hidden)]
-    fn with<M: Part, K: Part>(over: &Self::Over<M>, of: K) -> Self::Over<K>;
     /// So many over something.
     #[doc(hidden)]
     fn counted<M: Part>(of: M, count: usize) -> Self::Over<M>;
@@ -70,10 +67,6 @@ impl Order for ByList {
         primitives.len()
     }
 
-    fn with<M: Part, K: Part>(_: &M, of: K) -> K {
-        of
-    }
-
     fn counted<M: Part>(of: M, _: usize) -> M {
         of
     }
@@ -92,10 +85,6 @@ impl Order for InOrder {
     #[inline(always)]
     fn len<M: Part>(over: &Counted<M>, _: &[u32]) -> usize {
         over.count
-    }
-
-    fn with<M: Part, K: Part>(over: &Counted<M>, of: K) -> Counted<K> {
-        Self::counted(of, over.count)
     }
 
     fn counted<M: Part>(of: M, count: usize) -> Counted<M> {

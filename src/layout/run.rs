@@ -349,7 +349,7 @@ impl<N: WideNode, O: Order, S: Storage> Bvh<N, Runs<(), O>, S> {
                 needed: self.numbers,
             });
         }
-        Ok(self.with_leaves(O::with(self.leaf_store(), *mesh)))
+        Ok(self.with_leaves(O::counted(*mesh, self.primitive_count())))
     }
 }
 

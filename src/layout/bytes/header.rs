@@ -47,9 +47,11 @@ const _: () = assert!(size_of::<Header>() == 128);
 
 const MAGIC: [u8; 8] = *b"wide-bvh";
 const BYTE_ORDER: u32 = 0x0102_0304;
-const VERSION: u32 = 2;
 
 impl Header {
+    /// The version of the format that is written and read.
+    pub const VERSION: u32 = 2;
+
     /// That of a hierarchy with so many leaves, positions and triangles.
     ///
     /// # Errors
@@ -65,7 +67,7 @@ impl Header {
         Ok(Self {
             magic: MAGIC,
             byte_order: BYTE_ORDER,
-            version: VERSION,
+            version: Self::VERSION,
             node_kind: N::KIND,
             leaf_kind: L::KIND,
             nodes: bvh.nodes().len() as u32,
@@ -93,7 +95,7 @@ impl Header {
         if header.byte_order != BYTE_ORDER {
             return Err(BytesError::ByteOrder);
         }
-        if header.version != VERSION {
+        if header.version != Self::VERSION {
             return Err(BytesError::Version(header.version));
         }
         Ok(header)

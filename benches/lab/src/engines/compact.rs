@@ -62,7 +62,7 @@ fn of_order<'m, N: WideNode + Send + 'm>(
     };
     let (built, time) = pool(1)?.install(|| timed(build));
     let tree = Rc::new(built.map_err(|error| -> Box<dyn Error> { error })?);
-    let bytes = tree.bytes();
+    let bytes = tree.bytes(mesh.len());
     let built = Built { time, bytes };
     let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree));
     Ok(kinds.into_iter().map(engine).collect())
@@ -80,18 +80,11 @@ enum Tree<'m, N: WideNode> {
 }
 
 impl<N: WideNode> Tree<'_, N> {
-    /// What there is beside the mesh: triangles that are in a reordered one more than once, too.
-    fn bytes(&self) -> usize {
+    /// What there is beside a mesh of so many triangles: those that a reordered one has more than once, too.
+    fn bytes(&self, triangles: usize) -> usize {
         match self {
             Self::ByList(tree, _) => tree.bytes(),
-            Self::InOrder(tree, new) => {
-                let numbers = new
-                    .triangles
-                    .iter()
-                    .max()
-                    .map_or(0, |&last| last as usize + 1);
-                tree.bytes() + size_of_val(&new.indices[numbers..])
-            }
+            Self::InOrder(tree, new) => tree.bytes() + size_of_val(&new.indices[triangles..]),
         }
     }
 }
