@@ -32,6 +32,8 @@ pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     bounds: Aabb,
     backend: Backend,
     dropped: u32,
+    /// All bits, or none, if it is no more than caches are likely to hold.
+    large: u32,
 }
 
 /// Triangles under 8-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
@@ -114,7 +116,9 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         bounds: Aabb,
         root: Child,
     ) -> Self {
+        let is_large = L::len::<S>(&leaves, &primitives) > LARGE;
         Self {
+            large: u32::from(is_large).wrapping_neg(),
             numbers: L::numbers::<S>(&leaves, &primitives),
             nodes,
             leaves,
@@ -140,7 +144,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// Whether it is more than the caches are likely to hold.
     #[inline(always)]
     pub(crate) fn is_large(&self) -> bool {
-        self.primitive_count() > LARGE
+        self.large != 0
     }
 
     /// How many primitives all leaves have together: one that is in several is counted as often.
@@ -170,11 +174,14 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Has the leaves fetched that a node leads to, the first of them, if they are side by side.
+    /// Has the leaves fetched that a node leads to, the first of them, if it is quickly found where they are.
     #[inline(always)]
     pub(crate) fn prefetch_leaves<T: Simd>(&self, token: T, node: &N) {
-        if let Some(place) = node.first_leaf() {
-            token.prefetch(self.leaf_address(place));
+        if let Some(place) = node.first_leaf(self.large) {
+            let address = self.leaf_address(place);
+            for offset in (0..L::AHEAD).step_by(64) {
+                token.prefetch_line(address.wrapping_add(offset));
+            }
         }
     }
 
@@ -267,6 +274,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
             bounds: self.bounds,
             backend: self.backend,
             dropped: self.dropped,
+            large: self.large,
         }
     }
 

@@ -267,7 +267,7 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
     }
 
     #[inline(always)]
-    fn first_leaf(&self) -> Option<usize> {
+    fn first_leaf(&self, _: u32) -> Option<usize> {
         Some(self.head.first_leaf())
     }
 

@@ -83,8 +83,10 @@ impl<const W: usize, A> Node<W, A> {
     }
 
     #[inline(always)]
-    fn first_leaf(&self) -> Option<usize> {
-        None
+    fn first_leaf(&self, mask: u32) -> Option<usize> {
+        // Most nodes that lead to leaves lead to nothing else.
+        let link = Link::from_bits(self.links[0].to_bits() & mask);
+        link.is_leaf().then(|| link.leaf())
     }
 
     /// Those without a child say so themselves.

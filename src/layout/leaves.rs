@@ -6,7 +6,7 @@ use crate::{
         exact::{Pair, Pairs},
         triangle::{Aim, Look, Precision, RayShear, TriangleHits, Whether},
     },
-    simd::{Lanes, Simd},
+    simd::{Lanes, PREFETCHED, Simd},
 };
 use core::ops::Range;
 
@@ -22,6 +22,10 @@ pub trait Leaves: Sized {
     /// Whether there is a list of primitive numbers.
     #[doc(hidden)]
     const LISTED: bool = true;
+
+    /// How many bytes of leaves that are side by side are fetched in one go.
+    #[doc(hidden)]
+    const AHEAD: usize = PREFETCHED;
 
     /// Which of what is counted a leaf at `place` takes up: leaves, or primitive numbers.
     #[doc(hidden)]
@@ -93,6 +97,8 @@ pub trait Leaves: Sized {
 impl<L: Leaf> Leaves for L {
     type Store<S: Storage> = S::Slice<L>;
     type Ref<'a> = &'a L;
+
+    const AHEAD: usize = 4 * size_of::<L>();
 
     #[inline(always)]
     fn span(place: usize) -> Range<usize> {

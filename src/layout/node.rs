@@ -50,9 +50,10 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
     #[doc(hidden)]
     fn after(&self, nodes: u32, leaves: u32) -> Self;
 
-    /// The place of the first leaf that it leads to, if all that it leads to are side by side. Any if there is none.
+    /// The place of the first leaf that it leads to, if that is quickly found; the others follow. Compact nodes always tell, of any
+    /// place if they lead to none; other nodes if what they have there, masked, still leads to a leaf.
     #[doc(hidden)]
-    fn first_leaf(&self) -> Option<usize>;
+    fn first_leaf(&self, mask: u32) -> Option<usize>;
 
     /// How many lanes may have a child.
     #[doc(hidden)]
@@ -144,7 +145,7 @@ pub(super) mod sealed {
 /// - say where its links begin: `LINKS`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
-/// - say where its leaves are, if those are side by side: `first_leaf`;
+/// - say where its leaves begin, if that is quickly found: `first_leaf`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
 ///   `present_bits`;
 /// - say where a lane, or every one, leads: `link`, `link_lanes`, and the first by the second: `link_among`.
@@ -179,8 +180,8 @@ macro_rules! impl_wide_node {
             }
 
             #[inline(always)]
-            fn first_leaf(&self) -> Option<usize> {
-                self.first_leaf()
+            fn first_leaf(&self, mask: u32) -> Option<usize> {
+                self.first_leaf(mask)
             }
 
             #[inline(always)]
