@@ -7,7 +7,7 @@ use fastrand::Rng;
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::{
-    build::{Builder, ReorderedMesh},
+    build::{Builder, ReorderError, ReorderedMesh},
     geometry::{Ray, TriangleMesh},
     layout::{
         AlignedBytes, Borrowed, Bvh, BytesError, CompactNode4, CompactNode8, Counted, LayoutError,
@@ -19,7 +19,7 @@ use wide_bvh_scenes::shapes;
 
 /// Reorders, and checks the mesh that comes out.
 fn reordered<N: WideNode>(mesh: &TriangleMesh) -> (Bvh<N, OrderedLeaf, Owned>, ReorderedMesh) {
-    let builder = Builder::new().splits(1.0).drop_non_finite(true);
+    let builder = Builder::new().splits(0.0).drop_non_finite(true);
     let bvh = builder.build_compact::<N>(mesh).unwrap();
     let (ordered, new) = bvh.reorder(mesh).unwrap();
     assert_eq!(bvh.nodes().len(), ordered.nodes().len());
@@ -32,7 +32,6 @@ fn reordered<N: WideNode>(mesh: &TriangleMesh) -> (Bvh<N, OrderedLeaf, Owned>, R
     assert!(others.is_sorted() && others.iter().all(|other| !listed.contains(other)));
     let mut numbers = new.triangles.clone();
     numbers.sort_unstable();
-    numbers.dedup();
     assert!(numbers.into_iter().eq(0..mesh.len() as u32));
     assert_eq!(new.indices.len(), new.triangles.len());
     for (corners, &was) in new.indices.iter().zip(&new.triangles) {
@@ -144,11 +143,43 @@ fn another_mesh() {
     let needed = mesh.indices.len();
     assert_eq!(
         error,
-        MeshTooSmall {
+        ReorderError::Mesh(MeshTooSmall {
             triangles: needed - 1,
             needed: needed as u64
-        }
+        })
     );
+}
+
+/// A triangle that was cut would have several numbers, and which of them a ray finds is up to the tree.
+#[test]
+fn cut_triangles() {
+    let mut rng = Rng::with_seed(SEED);
+    let mut unit = move || Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 2.0 - 1.0;
+    // Every third a long one across others' boxes; and many enough for the builder to cut.
+    let corners = |i: u32| {
+        let at = unit() * 10.0;
+        let length = if i.is_multiple_of(3) { 6.0 } else { 0.3 };
+        [at, at + unit() * 0.1, at + unit() * length]
+    };
+    let positions: Vec<_> = (0..1500)
+        .flat_map(corners)
+        .map(|at| at.to_array())
+        .collect();
+    let indices: Vec<_> = (0..1500).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let view = TriangleMesh::new(&positions, &indices).unwrap();
+    let builder = Builder::new().splits(1.0);
+    let bvh = builder.build_compact::<CompactNode8>(&view).unwrap();
+    let mut listed = bvh.primitives().to_vec();
+    listed.sort_unstable();
+    let twice = |number: u32| listed.iter().filter(|&&other| other == number).count() > 1;
+    match bvh.reorder(&view).unwrap_err() {
+        ReorderError::Repeated { primitive } => assert!(twice(primitive as u32)),
+        other => panic!("{other}"),
+    }
+    let rays: Vec<Ray> = (0..300)
+        .map(|_| Ray::segment(unit() * 10.0, unit() * 10.0))
+        .collect();
+    check::<CompactNode8>(&view, &rays);
 }
 
 /// Of an ordered hierarchy it is how many primitives there are that has to be right.
@@ -156,7 +187,8 @@ fn another_mesh() {
 fn counts() {
     let mesh = shapes::icosphere(2);
     let view = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
-    let bvh = Builder::new().build_compact::<CompactNode8>(&view).unwrap();
+    let builder = Builder::new().splits(0.0);
+    let bvh = builder.build_compact::<CompactNode8>(&view).unwrap();
     let (ordered, new) = bvh.reorder(&view).unwrap();
     let count = ordered.primitive_count();
     let (nodes, bounds) = (ordered.nodes(), *ordered.bounds());

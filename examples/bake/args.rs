@@ -19,9 +19,8 @@ Usage: bake MESH OUT [OPTIONS]
                        in the file
       --reorder        compact with the mesh in the order in which rays read it, its vertices, too, and the numbers in
                        hits: no list of numbers, and large meshes are faster, see `Bvh::reorder`
-      --numbers FILE   with --reorder: writes the numbers that triangles had, one that was cut as often as there are
-                       pieces, then those that vertices had, for what else goes by them; 32 bits each, the lowest
-                       byte first
+      --numbers FILE   with --reorder: writes the numbers that triangles had, then those that vertices had, for what
+                       else goes by them; 32 bits each, the lowest byte first
       --without-mesh   compact without the mesh: for who has that in memory already, see `Bvh::over`
   -h, --help           this text
 

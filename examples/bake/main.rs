@@ -101,7 +101,11 @@ fn compact<N: WideNode>(mesh: &Mesh, in_file: MeshInFile) -> Result<Baked, Box<d
     let triangles = TriangleMesh::new(&mesh.positions, &mesh.indices)?;
     let mut numbers = Vec::new();
     let start = Instant::now();
-    let tree = builder().build_compact::<N>(&triangles)?;
+    let builder = match in_file {
+        MeshInFile::Reordered => builder().splits(0.0),
+        _ => builder(),
+    };
+    let tree = builder.build_compact::<N>(&triangles)?;
     let time = start.elapsed();
     let mut parts = vec![("nodes", size_of_val(tree.nodes()))];
     let list = ("leaf data", size_of_val(tree.primitives()));

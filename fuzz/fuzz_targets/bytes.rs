@@ -120,7 +120,8 @@ fn of_nodes<N: WideNode>(builder: &Builder, input: &Input, mesh: &Mesh, leaves: 
         2 => compact.to_bytes(),
         3 => compact.over(&mesh).expect("its mesh").to_bytes(),
         _ => {
-            let (ordered, new) = compact.reorder(&mesh).expect("its mesh");
+            let uncut = builder.splits(0.0).build_compact::<N>(&mesh);
+            let (ordered, new) = uncut.expect("a build").reorder(&mesh).expect("its mesh");
             let mesh = TriangleMesh::new(&new.positions, &new.indices).expect("a mesh");
             match leaves {
                 4 => ordered.to_bytes(),

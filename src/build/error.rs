@@ -1,6 +1,6 @@
 //! Why a hierarchy could not be built.
 
-use crate::layout::LayoutError;
+use crate::layout::{LayoutError, MeshTooSmall};
 use core::{error::Error, fmt};
 use glam::Vec3;
 
@@ -81,6 +81,19 @@ pub enum RefitError {
     },
 }
 
+/// Why a mesh could not be put in the order of a hierarchy's leaves; names the first offender.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ReorderError {
+    /// It is not the mesh that the hierarchy was built on.
+    Mesh(MeshTooSmall),
+    /// A triangle is in several leaves, and would have a number in each.
+    Repeated {
+        /// The triangle.
+        primitive: usize,
+    },
+}
+
 impl RefitError {
     /// The primitive that it is about.
     pub fn primitive(&self) -> usize {
@@ -114,6 +127,27 @@ impl fmt::Display for RefitError {
 
 // What is inside is in the text: there is no source that would say it twice.
 impl Error for RefitError {}
+
+impl fmt::Display for ReorderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mesh(error) => error.fmt(f),
+            Self::Repeated { primitive } => write!(
+                f,
+                "triangle {primitive} is in several leaves, and would have a number in each: build with splits(0.0)"
+            ),
+        }
+    }
+}
+
+// What is inside is in the text: there is no source that would say it twice.
+impl Error for ReorderError {}
+
+impl From<MeshTooSmall> for ReorderError {
+    fn from(error: MeshTooSmall) -> Self {
+        Self::Mesh(error)
+    }
+}
 
 impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -79,7 +79,7 @@ mod walk;
 
 pub use binary::{BinaryNode, BinaryTree, TreeError};
 pub use builder::Builder;
-pub use error::{BuildError, RefitError};
+pub use error::{BuildError, RefitError, ReorderError};
 pub use monitor::Monitor;
 pub use preset::Preset;
 pub use reorder::ReorderedMesh;

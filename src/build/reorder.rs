@@ -1,9 +1,9 @@
 //! A mesh in the order in which rays read it.
 
-use super::pages;
+use super::{ReorderError, pages};
 use crate::{
     geometry::TriangleMesh,
-    layout::{Bvh, MeshTooSmall, OrderedLeaf, Owned, RunLeaf, WideNode},
+    layout::{Bvh, OrderedLeaf, Owned, RunLeaf, WideNode},
 };
 use std::{vec, vec::Vec};
 
@@ -13,7 +13,7 @@ use std::{vec, vec::Vec};
 pub struct ReorderedMesh {
     /// The vertices that triangles use.
     pub positions: Vec<[f32; 3]>,
-    /// All triangles, each as often as it is in a leaf; those that are in none come last.
+    /// All triangles; those that are in no leaf come last.
     pub indices: Vec<[u32; 3]>,
     /// The number that each vertex had: what else is known of vertices goes by it into the new order.
     pub vertices: Vec<u32>,
@@ -30,15 +30,14 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
     /// larger than the caches rays are the faster for it, and for the large pages that the new buffers are on: twice as fast over
     /// ten million triangles that were in no good order, 4 to 8 % over those of a hundred thousand (Intel).
     ///
-    /// A triangle that was cut, and is in several leaves, is in the new mesh as often. [`splits(0.0)`](super::Builder::splits)
-    /// makes none of those.
+    /// It has to be built with [`splits(0.0)`](super::Builder::splits), for each triangle to be in one leaf and have one number.
     ///
     /// ```
     /// # use wide_bvh::{build::Builder, geometry::{Ray, TriangleMesh}, layout::CompactBvh8};
     /// # let positions = [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0_f32]];
     /// # let indices = [[0, 1, 2_u32]];
     /// let mesh = TriangleMesh::new(&positions, &indices)?;
-    /// let compact: CompactBvh8 = Builder::new().build_compact(&mesh)?;
+    /// let compact: CompactBvh8 = Builder::new().splits(0.0).build_compact(&mesh)?;
     /// let (ordered, reordered) = compact.reorder(&mesh)?;
     /// let mesh = TriangleMesh::new(&reordered.positions, &reordered.indices)?;
     /// let hit = ordered.over(&mesh)?.closest_hit(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])).unwrap();
@@ -47,15 +46,18 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
     /// ```
     ///
     /// # Errors
-    /// The mesh has no triangle of some number that is in a leaf.
+    /// The mesh has no triangle of some number that is in a leaf; the first triangle that is in a second one.
     pub fn reorder(
         &self,
         mesh: &TriangleMesh,
-    ) -> Result<(Bvh<N, OrderedLeaf, Owned>, ReorderedMesh), MeshTooSmall> {
+    ) -> Result<(Bvh<N, OrderedLeaf, Owned>, ReorderedMesh), ReorderError> {
         self.over(mesh)?;
         let mut is_listed = vec![false; mesh.len()];
         for &number in self.primitives() {
-            is_listed[number as usize] = true;
+            let primitive = number as usize;
+            if core::mem::replace(&mut is_listed[primitive], true) {
+                return Err(ReorderError::Repeated { primitive });
+            }
         }
         let mut triangles = self.primitives().to_vec();
         triangles.extend((0..mesh.len() as u32).filter(|&number| !is_listed[number as usize]));

@@ -44,6 +44,8 @@ pub type Bvh4Ref<'a> = Bvh<Node4, TriangleLeaf, Borrowed<'a>>;
 pub type PrimitiveBvh8Ref<'a> = Bvh<Node8, PrimitiveLeaf, Borrowed<'a>>;
 /// A caller's primitives under 4-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type PrimitiveBvh4Ref<'a> = Bvh<Node4, PrimitiveLeaf, Borrowed<'a>>;
+/// Triangles under 8-wide nodes of 80 bytes, borrowed. Queries: [`traverse`](crate::traverse).
+pub type QuantizedBvh8Ref<'a> = Bvh<CompactNode8, TriangleLeaf, Borrowed<'a>>;
 /// Primitive numbers under 8-wide nodes of 80 bytes, borrowed. Queries: [`traverse`](crate::traverse).
 pub type CompactBvh8Ref<'a> = Bvh<CompactNode8, RunLeaf, Borrowed<'a>>;
 /// Primitive numbers under 4-wide nodes of 48 bytes, borrowed. Queries: [`traverse`](crate::traverse).
@@ -75,6 +77,9 @@ mod owned {
     pub type PrimitiveBvh8 = Bvh<Node8, PrimitiveLeaf, Owned>;
     /// A caller's primitives under 4-wide nodes. Queries: [`traverse`](crate::traverse).
     pub type PrimitiveBvh4 = Bvh<Node4, PrimitiveLeaf, Owned>;
+    /// Triangles under 8-wide nodes of 80 bytes: for scenes of millions. [`Builder::build_as`](crate::build::Builder::build_as)
+    /// makes it. Queries: [`traverse`](crate::traverse).
+    pub type QuantizedBvh8 = Bvh<CompactNode8, TriangleLeaf, Owned>;
     /// Primitive numbers under 8-wide nodes of 80 bytes. Queries: [`traverse`](crate::traverse).
     pub type CompactBvh8 = Bvh<CompactNode8, RunLeaf, Owned>;
     /// Primitive numbers under 4-wide nodes of 48 bytes. Queries: [`traverse`](crate::traverse).

@@ -22,10 +22,12 @@ pub(crate) use bvh::tested_bounds;
 pub use bvh::{
     Bvh, Bvh4Ref, Bvh8Ref, CompactBvh4Ref, CompactBvh8Ref, MeshBvh4, MeshBvh8, OrderedBvh4Ref,
     OrderedBvh8Ref, OrderedMeshBvh4, OrderedMeshBvh8, PrimitiveBvh4Ref, PrimitiveBvh8Ref,
+    QuantizedBvh8Ref,
 };
 #[cfg(feature = "alloc")]
 pub use bvh::{
     Bvh4, Bvh8, CompactBvh4, CompactBvh8, OrderedBvh4, OrderedBvh8, PrimitiveBvh4, PrimitiveBvh8,
+    QuantizedBvh8,
 };
 #[cfg(feature = "alloc")]
 pub use bytes::AlignedBytes;

@@ -51,18 +51,16 @@ fn of_order<'m, N: WideNode + Send + 'm>(
         return Ok(Vec::new());
     }
     let build = || -> Result<_, Box<dyn Error + Send + Sync>> {
-        let tree = Builder::new().build_compact::<N>(mesh)?;
-        Ok(match reorder {
-            true => {
-                let (tree, reordered) = tree.reorder(mesh)?;
-                Tree::InOrder(tree, reordered)
-            }
-            false => Tree::ByList(tree, *mesh),
-        })
+        if !reorder {
+            return Ok(Tree::ByList(Builder::new().build_compact(mesh)?, *mesh));
+        }
+        let uncut = Builder::new().splits(0.0).build_compact::<N>(mesh)?;
+        let (tree, reordered) = uncut.reorder(mesh)?;
+        Ok(Tree::InOrder(tree, reordered))
     };
     let (built, time) = pool(1)?.install(|| timed(build));
     let tree = Rc::new(built.map_err(|error| -> Box<dyn Error> { error })?);
-    let bytes = tree.bytes(mesh.len());
+    let bytes = tree.bytes();
     let built = Built { time, bytes };
     let engine = |(name, make): (String, Make<'m, N>)| make(name, built, Rc::clone(&tree));
     Ok(kinds.into_iter().map(engine).collect())
@@ -80,11 +78,11 @@ enum Tree<'m, N: WideNode> {
 }
 
 impl<N: WideNode> Tree<'_, N> {
-    /// What there is beside a mesh of so many triangles: those that a reordered one has more than once, too.
-    fn bytes(&self, triangles: usize) -> usize {
+    /// What there is beside a mesh.
+    fn bytes(&self) -> usize {
         match self {
             Self::ByList(tree, _) => tree.bytes(),
-            Self::InOrder(tree, new) => tree.bytes() + size_of_val(&new.indices[triangles..]),
+            Self::InOrder(tree, _) => tree.bytes(),
         }
     }
 }

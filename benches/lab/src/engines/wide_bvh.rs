@@ -1,5 +1,5 @@
 //! This crate: each width on each of the processor's backends, a ray a call or all at once; on the
-//! best one also eight a call, and approximately. A width is built once; its backends
+//! best one also eight a call, approximately, and with compact nodes. A width is built once; its backends
 //! trace the same tree in the same memory.
 
 use super::{Batch, Built, Chosen, Engine, Takes, timed};
@@ -15,11 +15,13 @@ use std::{
 use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
-    layout::{Bvh, Node4, Node8, Owned, Storage, TriangleLeaf, TriangleLeaves, WideNode},
+    layout::{
+        Bvh, CompactNode8, Node4, Node8, Owned, Storage, TriangleLeaf, TriangleLeaves, WideNode,
+    },
     simd::Backend,
 };
 
-/// Both widths on every backend, built by one thread.
+/// Both widths on every backend, and compact nodes over leaves of their own on the best, built by one thread.
 ///
 /// # Errors
 /// The mesh cannot be built on.
@@ -27,8 +29,16 @@ pub fn engines(
     mesh: &TriangleMesh<'_>,
     chosen: Chosen<'_>,
 ) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
-    let mut engines = of_width::<Node8>(mesh, chosen)?;
-    engines.extend(of_width::<Node4>(mesh, chosen)?);
+    let every: Vec<Backend> = Backend::available().collect();
+    let mut engines = of_nodes::<Node8>("8", mesh, &every, chosen)?;
+    engines.extend(of_nodes::<Node4>("4", mesh, &every, chosen)?);
+    let best = [Backend::detect()];
+    engines.extend(of_nodes::<CompactNode8>(
+        "8 quantized",
+        mesh,
+        &best,
+        chosen,
+    )?);
     Ok(engines)
 }
 
@@ -61,20 +71,22 @@ type Triangles<N> = Bvh<N, TriangleLeaf, Owned>;
 /// A tree that engines share, each of which sets its backend before it traces.
 type Shared<N> = Rc<RefCell<Triangles<N>>>;
 
-fn of_width<N: WideNode + Send + 'static>(
+fn of_nodes<N: WideNode + Send + 'static>(
+    nodes: &str,
     mesh: &TriangleMesh<'_>,
+    backends: &[Backend],
     chosen: Chosen<'_>,
 ) -> Result<Vec<Box<dyn Engine>>, Box<dyn Error>> {
     let mut kinds: Vec<(String, Backend, Make<N>)> = Vec::new();
-    for backend in Backend::available() {
-        let name = format!("wide-bvh {} {}", N::WIDTH, backend.name());
+    for &backend in backends {
+        let name = format!("wide-bvh {nodes} {}", backend.name());
         kinds.push((name.clone(), backend, WideBvh::<N, OneByOne>::boxed));
         kinds.push((
             format!("{name} batch"),
             backend,
             WideBvh::<N, AllAtOnce>::boxed,
         ));
-        if N::WIDTH == 8 && backend == Backend::detect() {
+        if nodes == "8" && backend == Backend::detect() {
             let make = WideBvh::<N, InPackets>::boxed;
             kinds.push((format!("{name} packet 8"), backend, make));
             let make = WideBvh::<N, Approximately<OneByOne>>::boxed;

@@ -12,6 +12,7 @@ use wide_bvh::{
         AlignedBytes, Borrowed, Bvh, CompactNode4, CompactNode8, InBytes, MeshLeaf, Node4, Node8,
         Open, Owned, RunLeaf, Storage, TriangleLeaf, TriangleLeaves, WideNode,
     },
+    reference,
     simd::Backend,
     traverse::Scratch,
 };
@@ -205,7 +206,7 @@ fn check_width<N: WideNode>(
     Ok(checked)
 }
 
-/// Compact nodes over the mesh itself; also opened, without the mesh in the bytes and with it.
+/// Compact nodes over the mesh itself. The first also opened, in the order of its leaves, and with leaves that are stored.
 fn check_compact<N: WideNode>(
     mesh: &TriangleMesh,
     builds: &Builds,
@@ -214,6 +215,7 @@ fn check_compact<N: WideNode>(
     flush: bool,
     layout: usize,
 ) -> Result<u64, Mismatch> {
+    let some = |part: usize| &rays[..rays.len() / part];
     let mut checked = 0;
     let mut known: Vec<Bvh<N, RunLeaf, Owned>> = Vec::new();
     for (number, (name, settings)) in builds.own.iter().enumerate() {
@@ -239,26 +241,68 @@ fn check_compact<N: WideNode>(
             known.push(tree);
             continue;
         }
-        let at_once = wrong(|| name.clone());
-        let some = &rays[..rays.len() / 4];
-        checked += flushed_if(flush, || ask_at_once(&bvh, at_once, some, expected))?;
-        let some = &rays[..rays.len() / 16];
-        let name = format!("{name}, opened");
-        let bytes = written(&tree, &name)?;
-        let alone = opened::<N, RunLeaf>(&bytes, &name)?;
-        let alone = alone.over(mesh).map_err(|error| no_build(&name, error))?;
         checked += flushed_if(flush, || {
-            ask_one_by_one(&alone, || name.clone(), some, expected, Share::Whole)
+            ask_at_once(&bvh, wrong(|| name.clone()), some(4), expected)
         })?;
-        let name = format!("{name} with its mesh");
-        let bytes = written(&bvh, &name)?;
-        let whole = opened::<N, MeshLeaf>(&bytes, &name)?;
-        checked += flushed_if(flush, || {
-            ask_one_by_one(&whole, || name.clone(), some, expected, Share::Whole)
-        })?;
+        checked += check_opened(mesh, &tree, &name, some(16), expected, flush)?;
+        checked += check_ordered::<N>(mesh, builder, &name, some(16), flush)?;
+        let stored = builder.build_as::<N>(mesh);
+        let stored = stored.map_err(|error| no_build(&name, error))?;
+        let name = || format!("{name}, leaves stored");
+        let asked = [some(2), some(4)];
+        checked += flushed_if(flush, || ask(&stored, name, asked, expected, Share::Half))?;
         known.push(tree);
     }
     Ok(checked)
+}
+
+/// A compact hierarchy opened from bytes, without the mesh in them and with it.
+fn check_opened<N: WideNode>(
+    mesh: &TriangleMesh,
+    tree: &Bvh<N, RunLeaf, Owned>,
+    name: &str,
+    rays: &[Ray],
+    expected: &[Option<Hit>],
+    flush: bool,
+) -> Result<u64, Mismatch> {
+    let name = format!("{name}, opened");
+    let bytes = written(tree, &name)?;
+    let alone = opened::<N, RunLeaf>(&bytes, &name)?;
+    let alone = alone.over(mesh).map_err(|error| no_build(&name, error))?;
+    let mut checked = flushed_if(flush, || {
+        ask_one_by_one(&alone, || name.clone(), rays, expected, Share::Whole)
+    })?;
+    let name = format!("{name} with its mesh");
+    let bytes = written(&alone, &name)?;
+    let whole = opened::<N, MeshLeaf>(&bytes, &name)?;
+    checked += flushed_if(flush, || {
+        ask_one_by_one(&whole, || name.clone(), rays, expected, Share::Whole)
+    })?;
+    Ok(checked)
+}
+
+/// A compact hierarchy over the mesh in the order of its leaves, where triangles have other numbers: held to brute force over that
+/// mesh.
+fn check_ordered<N: WideNode>(
+    mesh: &TriangleMesh,
+    builder: Builder,
+    name: &str,
+    rays: &[Ray],
+    flush: bool,
+) -> Result<u64, Mismatch> {
+    let name = format!("{name}, in order");
+    let tree = builder.splits(0.0).build_compact::<N>(mesh);
+    let tree = tree.map_err(|error| no_build(&name, error))?;
+    let (tree, new) = tree.reorder(mesh).map_err(|error| no_build(&name, error))?;
+    let mesh = TriangleMesh::new(&new.positions, &new.indices);
+    let mesh = mesh.map_err(|error| no_build(&name, error))?;
+    let bvh = tree.over(&mesh).map_err(|error| no_build(&name, error))?;
+    flushed_if(flush, || {
+        let closest = |ray| reference::closest_hit(&mesh, ray);
+        let expected: Vec<_> = rays.iter().map(closest).collect();
+        let one_by_one = ask_one_by_one(&bvh, || name.clone(), rays, &expected, Share::Whole)?;
+        Ok(one_by_one + ask_at_once(&bvh, wrong(|| name.clone()), rays, &expected)?)
+    })
 }
 
 fn is_finite(mesh: &TriangleMesh) -> bool {
