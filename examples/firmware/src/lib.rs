@@ -1,7 +1,7 @@
 #![no_std]
 //! What lies in flash, and the hierarchy over it: nothing is copied.
 
-use wide_bvh::{geometry::Ray, layout::MeshBvh4};
+use wide_bvh::{geometry::Ray, layout::OrderedMeshBvh4};
 
 /// As aligned as anything that is baked has to be.
 #[repr(C, align(64))]
@@ -20,8 +20,8 @@ macro_rules! baked {
 }
 
 /// The hierarchy and the mesh that it is over, checked once. `None` if what was baked is none.
-pub fn open() -> Option<MeshBvh4<'static>> {
-    MeshBvh4::from_bytes(baked!("scene")).ok()
+pub fn open() -> Option<OrderedMeshBvh4<'static>> {
+    OrderedMeshBvh4::from_bytes(baked!("scene")).ok()
 }
 
 /// Rays of every kind.

@@ -8,7 +8,7 @@ mod stack;
 
 use cortex_m_rt::entry;
 use semihosting::{println, process};
-use wide_bvh::layout::MeshBvh4;
+use wide_bvh::layout::OrderedMeshBvh4;
 use wide_bvh_firmware::{hits, open, rays};
 
 #[entry]
@@ -25,7 +25,7 @@ fn main() -> ! {
     picture::draw(&bvh);
     println!(
         "{} triangles, {} rays, {wrong} answers other than the host's",
-        bvh.primitives().len(),
+        bvh.primitive_count(),
         rays().len()
     );
     println!("{opening} bytes of stack to open the hierarchy, {tracing} to trace; no others");
@@ -34,7 +34,7 @@ fn main() -> ! {
 
 /// How many rays are answered in another way than on the host.
 #[inline(never)]
-fn trace(bvh: &MeshBvh4) -> usize {
+fn trace(bvh: &OrderedMeshBvh4) -> usize {
     let mut wrong = 0;
     for (ray, &expected) in rays().iter().zip(hits()) {
         let hit = bvh.closest_hit(ray);

@@ -1,7 +1,7 @@
 //! A picture in letters.
 
 use semihosting::print;
-use wide_bvh::{geometry::Ray, layout::MeshBvh4};
+use wide_bvh::{geometry::Ray, layout::OrderedMeshBvh4};
 
 const COLUMNS: usize = 64;
 const ROWS: usize = 26;
@@ -9,7 +9,7 @@ const ROWS: usize = 26;
 const LETTERS: &[u8] = b".:-=+*#%@";
 
 /// Prints the scene from above, light where it is near.
-pub fn draw(bvh: &MeshBvh4) {
+pub fn draw(bvh: &OrderedMeshBvh4) {
     let bounds = bvh.bounds();
     let size = bounds.max - bounds.min;
     for row in 0..ROWS {

@@ -21,12 +21,12 @@ fn main() -> ! {
 #[cfg(feature = "queries")]
 fn queries() {
     use core::hint::black_box;
-    use wide_bvh::{geometry::Ray, layout::MeshBvh4};
+    use wide_bvh::{geometry::Ray, layout::OrderedMeshBvh4};
 
     // SAFETY: never run.
     let (bvh, ray) = unsafe {
         (
-            &*black_box(0x2000_0000 as *const MeshBvh4),
+            &*black_box(0x2000_0000 as *const OrderedMeshBvh4),
             &*black_box(0x2000_1000 as *const Ray),
         )
     };
