@@ -7,9 +7,9 @@
 ///
 /// | | build, ns a triangle | bounce rays, of [`Best`](Self::Best)'s |
 /// | --- | --- | --- |
-/// | [`Fast`](Self::Fast) | 77 to 122 | 0.77 |
-/// | [`Balanced`](Self::Balanced) | 313 to 480 | 0.96 |
-/// | [`Best`](Self::Best) | 643 to 1,295 | 1 |
+/// | [`Fast`](Self::Fast) | 67 to 88 | 0.77 |
+/// | [`Balanced`](Self::Balanced) | 283 to 456 | 0.97 |
+/// | [`Best`](Self::Best) | 608 to 1,187 | 1 |
 ///
 /// A Zen 4 (AMD EPYC) takes about as long, one of the first Zen generation up to twice that. What moves without
 /// changing can be [refitted](crate::layout::Bvh::refit), in 40 to 100 ns a triangle on that one.

@@ -300,8 +300,16 @@ fn check_ordered<N: WideNode>(
     flushed_if(flush, || {
         let closest = |ray| reference::closest_hit(&mesh, ray);
         let expected: Vec<_> = rays.iter().map(closest).collect();
-        let one_by_one = ask_one_by_one(&bvh, || name.clone(), rays, &expected, Share::Whole)?;
-        Ok(one_by_one + ask_at_once(&bvh, wrong(|| name.clone()), rays, &expected)?)
+        let ask = || {
+            let one_by_one = ask_one_by_one(&bvh, || name.clone(), rays, &expected, Share::Whole)?;
+            Ok(one_by_one + ask_at_once(&bvh, wrong(|| name.clone()), rays, &expected)?)
+        };
+        ask().map_err(|mismatch: Mismatch| {
+            let hit = mismatch.ray.map(|ray| show(expected[ray]));
+            let hit = hit.unwrap_or_default();
+            let got = format!("{}\nbrute force in that order: {hit}", mismatch.got);
+            Mismatch { got, ..mismatch }
+        })
     })
 }
 
