@@ -32,7 +32,8 @@ pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     bounds: Aabb,
     backend: Backend,
     dropped: u32,
-    /// All bits, or none, if it is no more than caches are likely to hold.
+    /// All bits, or none, if it is no more than caches are likely to hold: a mask on what is looked at only then, which is one
+    /// branch less than a condition.
     large: u32,
 }
 
