@@ -109,7 +109,7 @@ fn of_parts(nodes: u8, leaves: u8, bounds: [f32; 6], sections: &[Vec<u8>; 5]) ->
 
 fn of_nodes<N: WideNode>(builder: &Builder, input: &Input, mesh: &Mesh, leaves: u8) -> Vec<u8> {
     let mesh = mesh.view();
-    let compact = builder.build_compact::<N>(&mesh).expect("a build");
+    let compact = |builder: Builder| builder.build_compact::<N>(&mesh).expect("a build");
     let bytes = match leaves {
         1 => {
             let mut boxes = boxes(&input.boxes, 1);
@@ -117,11 +117,11 @@ fn of_nodes<N: WideNode>(builder: &Builder, input: &Input, mesh: &Mesh, leaves: 
             let bvh = builder.build_compact_primitives::<N>(&boxes);
             bvh.expect("a build").to_bytes()
         }
-        2 => compact.to_bytes(),
-        3 => compact.over(&mesh).expect("its mesh").to_bytes(),
+        2 => compact(*builder).to_bytes(),
+        3 => compact(*builder).over(&mesh).expect("its mesh").to_bytes(),
         _ => {
-            let uncut = builder.splits(0.0).build_compact::<N>(&mesh);
-            let (ordered, new) = uncut.expect("a build").reorder(&mesh).expect("its mesh");
+            let uncut = compact(builder.splits(0.0));
+            let (ordered, new) = uncut.reorder(&mesh).expect("its mesh");
             let mesh = TriangleMesh::new(&new.positions, &new.indices).expect("a mesh");
             match leaves {
                 4 => ordered.to_bytes(),

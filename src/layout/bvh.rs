@@ -184,10 +184,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     #[inline(always)]
     pub(crate) fn prefetch_leaves<T: Simd>(&self, token: T, node: &N) {
         if let Some(place) = node.first_leaf(self.large) {
-            let address = self.leaf_address(place);
-            for offset in (0..L::AHEAD).step_by(64) {
-                token.prefetch_line(address.wrapping_add(offset));
-            }
+            token.prefetch_bytes(self.leaf_address(place), L::AHEAD);
         }
     }
 

@@ -62,13 +62,6 @@ impl<const AVX512: bool> Simd for X86<AVX512> {
     }
 
     #[inline(always)]
-    fn prefetch(self, address: *const u8) {
-        for line in 0..3 {
-            self.prefetch_line(address.wrapping_add(64 * line));
-        }
-    }
-
-    #[inline(always)]
     fn prefetch_line(self, address: *const u8) {
         // SAFETY: the token says that the instructions are there; a prefetch never faults.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) };

@@ -39,9 +39,6 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn prefetch(self, _: *const u8) {}
-
-    #[inline(always)]
     fn prefetch_line(self, _: *const u8) {}
 }
 

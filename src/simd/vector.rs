@@ -75,7 +75,19 @@ pub trait Simd: Copy {
     }
 
     /// Has the [three](PREFETCHED) cache lines from `address` on fetched, if the backend can. Any address will do.
-    fn prefetch(self, address: *const u8);
+    #[inline(always)]
+    fn prefetch(self, address: *const u8) {
+        self.prefetch_bytes(address, PREFETCHED);
+    }
+
+    /// Has the cache lines of so many bytes from `address` on fetched.
+    #[inline(always)]
+    fn prefetch_bytes(self, address: *const u8, bytes: usize) {
+        for offset in (0..bytes).step_by(64) {
+            self.prefetch_line(address.wrapping_add(offset));
+        }
+    }
+
     /// Has one cache line fetched.
     fn prefetch_line(self, address: *const u8);
 }

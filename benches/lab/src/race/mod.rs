@@ -51,7 +51,8 @@ use wide_bvh_scenes::Mesh;
 ///
 /// This crate's: `8` and `4`, the width; `quantized`, compact nodes over leaves of their own; `compact`, over the
 /// mesh's own buffers; `reordered`, over those in the order of the leaves; `approximate`, the triangle test in
-/// `f32` alone; `batch` and `packet 8`, calls for many rays. `portable` is what the program was compiled for, others are the processor's.
+/// `f32` alone; `batch` and `packet 8`, calls for many rays. `portable` is what the program was compiled for, others
+/// are the processor's.
 ///
 /// Builders take turns likewise. Their trees are compared by how fast bounce rays are traced, one a call, by
 /// one thread.
