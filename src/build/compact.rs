@@ -10,6 +10,9 @@ use crate::{
 };
 use std::vec::Vec;
 
+/// So many nodes are made in one go.
+const CHUNK: usize = 1 << 9;
+
 /// A hierarchy of nodes as wide, of the same boxes or somewhat larger ones.
 ///
 /// # Errors
@@ -41,7 +44,10 @@ pub(super) fn compact<N: WideNode, C: WideNode>(
                 .chain(children.filter(is_leaf)),
         )
     };
-    let nodes: Vec<C> = pages::collected(full.nodes().iter().map(node));
+    let nodes = pages::made(full.nodes().len(), CHUNK, |first, nodes| {
+        let all = &full.nodes()[first..][..nodes.left()];
+        all.iter().for_each(|full| nodes.push(node(full)));
+    });
     let bounds = tested_bounds(&nodes, *full.bounds());
     let count = primitives.len();
     let compact = Bvh::from_parts(nodes, (), primitives, bounds).map_err(|error| match error {

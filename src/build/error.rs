@@ -67,6 +67,11 @@ pub enum RefitError {
         /// The primitive.
         primitive: usize,
     },
+    /// A triangle that is in a leaf which reads it from the mesh has lost its area.
+    AreaLost {
+        /// The triangle.
+        primitive: usize,
+    },
     /// Corners of triangles that were at one place are not any more, and their leaf has no room for so many.
     VerticesParted {
         /// The first triangle for which there is no room.
@@ -100,6 +105,7 @@ impl RefitError {
         match *self {
             Self::PrimitiveGone { primitive }
             | Self::PrimitiveLeftOut { primitive }
+            | Self::AreaLost { primitive }
             | Self::VerticesParted { primitive }
             | Self::Primitive { primitive, .. } => primitive,
         }
@@ -115,6 +121,10 @@ impl fmt::Display for RefitError {
             Self::PrimitiveLeftOut { primitive } => write!(
                 f,
                 "primitive {primitive} can be hit now, and was left out when this was built: build again"
+            ),
+            Self::AreaLost { primitive } => write!(
+                f,
+                "triangle {primitive} has lost its area, and is in a leaf that reads it from the mesh: build again"
             ),
             Self::VerticesParted { primitive } => write!(
                 f,

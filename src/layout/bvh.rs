@@ -334,9 +334,14 @@ impl<N: WideNode, L: Leaf> Bvh<N, L, crate::layout::Owned> {
         );
         Ok(Self::rooted(nodes, leaves, primitives, bounds, root))
     }
+}
 
+#[cfg(feature = "std")]
+impl<N: WideNode, L: Leaves> Bvh<N, L, crate::layout::Owned> {
     /// What changes when primitives move: leaves, nodes, and the bounds. That it stays sound is up to the caller.
-    pub(crate) fn moving_parts(&mut self) -> (&mut alloc::vec::Vec<L>, &mut [N], &mut Aabb) {
+    pub(crate) fn moving_parts(
+        &mut self,
+    ) -> (&mut L::Store<crate::layout::Owned>, &mut [N], &mut Aabb) {
         (&mut self.leaves, &mut self.nodes, &mut self.bounds)
     }
 }
