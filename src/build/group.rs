@@ -13,14 +13,17 @@ use super::{
     input::{Input, leaf_of},
     lay_out::{Part, below_inner, lay_out},
     monitor::Watch,
-    pages,
+    pages, parallel,
 };
 use crate::{geometry::Aabb, simd::Backend};
 use core::ops::ControlFlow;
-use std::vec::Vec;
+use std::{vec, vec::Vec};
 
 /// The most primitives that a leaf of any kind has.
 const MAX_LEAF: usize = 8;
+
+/// The leaves of so many wide nodes are joined in one go.
+const CHUNK: usize = 1 << 7;
 
 /// A leaf to be.
 #[derive(Clone, Copy)]
@@ -131,38 +134,50 @@ fn groups<I: Input, const W: usize>(
     measure: &Measure,
     watch: &Watch,
 ) -> Vec<Group> {
-    let mut groups = Vec::new();
     let leaf = |node: usize| {
-        if !collapse.is_leaf(node) {
-            return None;
-        }
         let numbers = &tree.order()[collapse.places(node)];
         let primitives = numbers.iter().map(|&number| input.primitive(number));
-        Some(Group::new(node, tree.nodes()[node].aabb, primitives))
+        Group::new(node, tree.nodes()[node].aabb, primitives)
     };
-    let mut todo = Vec::new();
-    match leaf(0) {
-        Some(group) => groups.push(group),
-        None => todo.push(0),
+    if collapse.is_leaf(0) {
+        return vec![leaf(0)];
     }
+    // By wide node, as the ends of runs.
+    let (mut leaves, mut ends) = (Vec::new(), Vec::new());
+    let mut todo = vec![0];
     while let Some(node) = todo.pop() {
-        if !watch.advance(W) {
-            break;
-        }
         let (children, count) = collapse.children(node);
-        let (mut leaves, mut len) = ([Group::NONE; W], 0);
         for &child in &children[..count] {
-            match leaf(child) {
-                Some(leaf) => {
-                    leaves[len] = leaf;
-                    len += 1;
-                }
-                None => todo.push(child),
+            match collapse.is_leaf(child) {
+                true => leaves.push(child),
+                false => todo.push(child),
             }
         }
-        groups.extend_from_slice(join_pairs(input, measure, &mut leaves[..len]));
+        ends.push(leaves.len());
     }
-    groups
+    let mut start = 0;
+    let chunks = ends.chunks(CHUNK).map(|ends| {
+        let first = start;
+        start = ends[ends.len() - 1];
+        (first, ends)
+    });
+    let joined = |(mut start, ends): (usize, &[usize])| {
+        let mut groups = Vec::with_capacity(ends[ends.len() - 1] - start);
+        for &end in ends {
+            if !watch.advance(W) {
+                break;
+            }
+            let mut alike = [Group::NONE; W];
+            let run = &leaves[start..end];
+            for (group, &node) in alike.iter_mut().zip(run) {
+                *group = leaf(node);
+            }
+            groups.extend_from_slice(join_pairs(input, measure, &mut alike[..run.len()]));
+            start = end;
+        }
+        groups
+    };
+    parallel::map(chunks, joined).concat()
 }
 
 /// Joins leaves, the best pair first, for as long as it is worth it: those that are left.
