@@ -32,7 +32,7 @@ const THIN: f32 = 2.0;
 const UPPER: f32 = 1.125;
 
 impl Frame {
-    /// The grid for `aabbs`, and the planes on it. Lanes without a box have planes of no meaning.
+    /// The grid for `aabbs`, and the planes on it. Lanes without a box have planes 0.
     pub fn new<const W: usize>(aabbs: &[Aabb]) -> (Self, Planes<W>) {
         let count = aabbs.len().min(W);
         let mut sides: Sides<W> = [[[0.0; W]; 2]; 3];
@@ -52,16 +52,16 @@ impl Frame {
             let step = (f64::from(end) - f64::from(origin)) / 255.0;
             frame.steps[axis] = ((step as f32).to_bits() >> 23).max(LEAST_STEP.into()) as u8;
             // The step was rounded down to a power of two; and so is the plane, to a float.
-            while frame.above(axis, end).is_none() {
+            while frame.ends_before(axis, end) {
                 frame.steps[axis] += 1;
             }
             if let Some(face) = frame.main_face(axis, &sides, count) {
                 frame.align(axis, face, end);
             }
-            for lane in 0..count {
-                below[lane] = frame.below(axis, los[lane]);
-                above[lane] = frame.above(axis, his[lane]).unwrap_or(u8::MAX);
-            }
+            *below = frame.below(axis, &sides[axis][0]);
+            *above = frame.above(axis, &sides[axis][1]);
+            below[count..].fill(0);
+            above[count..].fill(0);
         }
         (frame, planes)
     }
@@ -77,29 +77,32 @@ impl Frame {
         count: usize,
     ) -> Option<(f32, bool)> {
         let size = |axis: usize, lane: usize| sides[axis][1][lane] - sides[axis][0][lane];
-        let part = |x: f32| {
-            let steps = self.steps_to(axis, x);
-            ((steps - f64::from(steps as u8)) * PARTS as f64 + 0.5) as usize % PARTS
-        };
         // By part.
         let mut weights = [0.0; PARTS];
-        // By side and lane.
-        let (mut parts, mut areas) = ([[0; W]; 2], [[0.0; W]; 2]);
-        for lane in 0..count {
-            let mut area = size((axis + 1) % 3, lane) * size((axis + 2) % 3, lane);
-            if size(axis, lane) * PARTS as f32 <= self.step(axis) {
-                area *= THIN;
+        // By side and lane, and by lane and side.
+        let (mut parts, mut areas) = ([[0; W]; 2], [[0.0; 2]; W]);
+        for (parts, sides) in parts.iter_mut().zip(&sides[axis]) {
+            for (part, &x) in parts.iter_mut().zip(sides) {
+                let steps = self.steps_to(axis, x);
+                let nearest = floor((steps - floor(steps)) * PARTS as f64 + 0.5);
+                *part = integer(nearest) as usize % PARTS;
             }
-            for (side, area) in [area, area * UPPER].into_iter().enumerate() {
-                let part = part(sides[axis][side][lane]);
-                (parts[side][lane], areas[side][lane]) = (part, area);
-                weights[part] += area;
+        }
+        for (lane, areas) in areas.iter_mut().enumerate() {
+            let area = size((axis + 1) % 3, lane) * size((axis + 2) % 3, lane);
+            let is_thin = size(axis, lane) * PARTS as f32 <= self.step(axis);
+            let area = if is_thin { area * THIN } else { area };
+            *areas = [area, area * UPPER];
+        }
+        for lane in 0..count {
+            for side in 0..2 {
+                weights[parts[side][lane]] += areas[lane][side];
             }
         }
         let (mut most, mut face) = ((0.0, 0.0), None);
         for side in 0..2 {
             for lane in 0..count {
-                let weight = (weights[parts[side][lane]], areas[side][lane]);
+                let weight = (weights[parts[side][lane]], areas[lane][side]);
                 if weight > most {
                     (most, face) = (weight, Some((sides[axis][side][lane], side == 1)));
                 }
@@ -130,27 +133,52 @@ impl Frame {
         }
     }
 
-    /// The number of the last plane that is not above `x`, which is not below the first.
-    fn below(&self, axis: usize, x: f32) -> u8 {
-        let mut number = self.number(axis, x);
-        while number > 0 && self.plane(axis, number) > x {
-            number -= 1;
+    /// The numbers of the last planes that are not above coordinates, which are not below the first.
+    fn below<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [u8; W] {
+        let mut numbers = self.numbers(axis, all);
+        loop {
+            let mut any = false;
+            for (number, &x) in numbers.iter_mut().zip(all) {
+                let is_above = (*number > 0.0) & (self.plane_at(axis, *number) > x);
+                *number -= if is_above { 1.0 } else { 0.0 };
+                any |= is_above;
+            }
+            if !any {
+                return bytes(&numbers);
+            }
         }
-        number
     }
 
-    /// The number of the first plane that is not below `x`, if there is one.
-    fn above(&self, axis: usize, x: f32) -> Option<u8> {
-        let mut number = self.number(axis, x);
-        while self.plane(axis, number) < x {
-            number = number.checked_add(1)?;
+    /// The numbers of the first planes that are not below coordinates, or of the last if there is none.
+    fn above<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [u8; W] {
+        let mut numbers = self.numbers(axis, all);
+        loop {
+            let mut any = false;
+            for (number, &x) in numbers.iter_mut().zip(all) {
+                let is_below = (*number < 255.0) & (self.plane_at(axis, *number) < x);
+                *number += if is_below { 1.0 } else { 0.0 };
+                any |= is_below;
+            }
+            if !any {
+                return bytes(&numbers);
+            }
         }
-        Some(number)
     }
 
-    /// The number of a plane near `x`.
-    fn number(&self, axis: usize, x: f32) -> u8 {
-        self.steps_to(axis, x) as u8
+    /// The numbers of planes near coordinates.
+    #[inline(always)]
+    fn numbers<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [f32; W] {
+        // No `map`, which stays a call.
+        let mut numbers = [0.0; W];
+        for (number, &x) in numbers.iter_mut().zip(all) {
+            *number = floor(self.steps_to(axis, x)).clamp(0.0, 255.0) as f32;
+        }
+        numbers
+    }
+
+    /// Whether `x`, which is not below the first plane, is above the last.
+    fn ends_before(&self, axis: usize, x: f32) -> bool {
+        self.plane(axis, u8::MAX) < x
     }
 
     /// How many steps it is from the first plane to `x`.
@@ -167,8 +195,40 @@ impl Frame {
 
     #[inline(always)]
     pub fn plane(&self, axis: usize, number: u8) -> f32 {
-        f32::from(number) * self.step(axis) + self.origin[axis]
+        self.plane_at(axis, f32::from(number))
     }
+
+    #[inline(always)]
+    fn plane_at(&self, axis: usize, number: f32) -> f32 {
+        number * self.step(axis) + self.origin[axis]
+    }
+}
+
+/// Numbers of planes as nodes hold them.
+#[inline(always)]
+fn bytes<const W: usize>(numbers: &[f32; W]) -> [u8; W] {
+    let mut bytes = [0; W];
+    for (byte, &number) in bytes.iter_mut().zip(numbers) {
+        *byte = number as u8;
+    }
+    bytes
+}
+
+/// 2^52: from it on floats are integers.
+const INTEGERS: f64 = (1u64 << 52) as f64;
+
+/// The greatest integer that is not above `x`, which is not negative and much less than 2^52. As vectors have it, without a
+/// conversion.
+#[inline(always)]
+fn floor(x: f64) -> f64 {
+    let nearest = (x + INTEGERS) - INTEGERS;
+    nearest - if nearest > x { 1.0 } else { 0.0 }
+}
+
+/// An integer from its float, likewise.
+#[inline(always)]
+fn integer(x: f64) -> u64 {
+    (x + INTEGERS).to_bits()
 }
 
 #[cfg(test)]

@@ -21,9 +21,9 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
     ///
     /// The time is linear, and less than that of any build. But the tree stays what it was, so queries get slower the
     /// further what was close together moves apart, or what was apart through each other: by about as much as
-    /// [`BuildReport::sah_cost`](super::BuildReport::sah_cost) grows. When that is more than a build is worth, build
+    /// [`BuildReport::sah_cost`](crate::build::BuildReport::sah_cost) grows. When that is more than a build is worth, build
     /// again. Pieces of triangles that the builder cut get the box of the whole triangle, so for what moves
-    /// [`Preset::Balanced`](super::Preset::Balanced) or [`splits(0.0)`](super::Builder::splits) is the better start.
+    /// [`Preset::Balanced`](crate::build::Preset::Balanced) or [`splits(0.0)`](crate::build::Builder::splits) is the better start.
     ///
     /// Triangles that lose their area are not hit, and are again when they regain it. Corners of several triangles that were
     /// at one place when this was built may part only as long as each leaf has no more than 8 places. Meshes in which each
