@@ -3,9 +3,7 @@
 //! *Exactly*: the answer in rationals, of the float ray and the float corners, by the definitions in `benches/lab/src/exact`.
 //! Where it says so of all rays, brute force was compared with it ray by ray.
 
-mod common;
-
-use common::{Variants, part};
+use crate::common::{Variants, part};
 use glam::Vec3;
 use wide_bvh::geometry::{Hit, Ray};
 use wide_bvh_scenes::shapes;
@@ -48,7 +46,7 @@ fn embree_181_174_rays_at_a_vertex() {
         .collect();
     let scene = Variants::new(positions, indices);
     let vertex = Vec3::new(0.3, 0.2, 0.1);
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     for _ in 0..part(5_000) {
         let away = Vec3::new(random.f32() - 0.5, random.f32() - 0.5, 0.6 + random.f32());
         let origin = vertex + away * 10f32.powf(random.f32() * 6.0 - 3.0);
@@ -64,7 +62,7 @@ fn embree_181_174_rays_at_a_vertex() {
 /// 1.3e-4, 2.1e-7 of themselves. The rest start in the triangle's plane, or are rounded off its edge.
 #[test]
 fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     let mut hits = 0;
     for _ in 0..part(20_000) {
         // Edges of 11.2, 9.7 and about 1.4; the plane holds the x axis, or nearly.
@@ -103,7 +101,7 @@ fn embree_387_no_hit_beyond_a_triangle_seen_edge_on() {
 fn embree_423_backends_agree_at_edges() {
     let scene = one_triangle([[0.1, 0.2, 1.0], [0.9, 0.3, 1.1], [0.4, 0.8, 0.9]]);
     let corners = scene.mesh().triangle(0).unwrap();
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     let mut hits = 0;
     for _ in 0..part(20_000) {
         let i = random.usize(..3);
@@ -128,7 +126,7 @@ fn embree_423_backends_agree_at_edges() {
 #[test]
 fn embree_416_no_phantoms_between_large_and_small() {
     let scene = one_triangle([[0.0, 0.0, 0.0], [60_000.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     for _ in 0..part(20_000) {
         let x = random.f32() * 60_000.0;
         // The triangle lies between the lines y = x / 60000 and y = 1; aim well outside.
@@ -376,7 +374,7 @@ fn bvh_44_degenerate_triangles() {
         [0, 3, 1],
     ];
     let scene = Variants::new(positions, degenerate);
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     for _ in 0..part(5_000) {
         let origin = Vec3::from([0; 3].map(|_| random.f32() * 4.0 - 2.0));
         let target = Vec3::X * (random.f32() * 2.0);

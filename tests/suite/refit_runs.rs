@@ -1,8 +1,6 @@
 //! Compact hierarchies that have followed a mesh, or primitives, answer as the reference does on them where they are.
 
-mod common;
-
-use common::{SEED, bits, config, coordinate, point, point_on, soup, target};
+use crate::common::{SEED, bits, config, coordinate, point, point_on, soup, target};
 use fastrand::Rng;
 use glam::Vec3;
 use proptest::prelude::*;

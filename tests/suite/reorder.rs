@@ -1,8 +1,6 @@
 //! A compact hierarchy and its mesh, put in the order of leaves: the same triangles, and the reference's answers on them.
 
-mod common;
-
-use common::{SEED, bits, config, part, point, point_on, soup, target};
+use crate::common::{SEED, bits, config, part, point, point_on, soup, target};
 use fastrand::Rng;
 use glam::Vec3;
 use proptest::prelude::*;

@@ -1,8 +1,6 @@
 //! A caller's own primitives: spheres, boxes, and a primitive whose test is wrong on purpose.
 
-mod common;
-
-use common::{any_float, config, point};
+use crate::common::{any_float, config, point};
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::{

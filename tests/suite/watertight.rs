@@ -1,8 +1,6 @@
 //! No ray from inside a closed mesh gets out, wherever it is aimed: a million rays.
 
-mod common;
-
-use common::{SEED, Variants, part};
+use crate::common::{SEED, Variants, part};
 use glam::Vec3;
 use wide_bvh::geometry::Ray;
 use wide_bvh_scenes::{Mesh, shapes};

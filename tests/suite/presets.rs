@@ -1,8 +1,6 @@
 //! Every preset gives the reference's answer, bit for bit, on shapes and soups.
 
-mod common;
-
-use common::{Variants, config, part, point, point_on, soup, target};
+use crate::common::{Variants, config, part, point, point_on, soup, target};
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::geometry::Ray;
@@ -10,7 +8,7 @@ use wide_bvh_scenes::{Mesh, shapes};
 
 /// Rays at vertices, edges and insides of a mesh's triangles, from all around and from within.
 fn rays(mesh: &Mesh, count: usize) -> impl Iterator<Item = Ray> + '_ {
-    let mut rng = fastrand::Rng::with_seed(common::SEED);
+    let mut rng = fastrand::Rng::with_seed(crate::common::SEED);
     let (min, max) = mesh.bounds();
     let (min, max) = (Vec3::from(min), Vec3::from(max));
     (0..count).map(move |ray| {

@@ -1,8 +1,6 @@
 //! The triangle test in `f32` alone: what it gives up, and what it does not.
 
-mod common;
-
-use common::{SEED, part};
+use crate::common::{SEED, part};
 use glam::Vec3;
 use wide_bvh::{
     build::Builder,

@@ -1,8 +1,6 @@
 //! Hierarchies written and opened again: the same answers, and an error for whatever else.
 
-mod common;
-
-use common::{SEED, bits};
+use crate::common::{SEED, bits};
 use wide_bvh::{
     build::{Builder, Preset},
     geometry::{Aabb, Ray, TriangleMesh},

@@ -1,9 +1,7 @@
 //! Batches and packets give the answers of one ray a call, bit for bit: whatever comes next to what, in whatever number,
 //! on every width and backend.
 
-mod common;
-
-use common::{SEED, bits};
+use crate::common::{SEED, bits};
 use fastrand::Rng;
 use glam::Vec3;
 use wide_bvh::{
