@@ -4,7 +4,7 @@ use crate::{Found, ask::ask_mesh, assert_all, of_mesh};
 use wide_bvh::{
     build::Builder,
     geometry::{Ray, TriangleMesh},
-    layout::{CompactNode4, CompactNode8, WideNode},
+    layout::{Bvh, CompactNode4, CompactNode8, Order, Owned, Runs, WideNode},
 };
 
 /// Holds a compact hierarchy over the mesh to what is true of it, on every backend; then one over the mesh reordered, and both when
@@ -19,29 +19,30 @@ pub fn assert_compact(builder: &Builder, mesh: &TriangleMesh, rays: &[Ray], trut
 #[inline(never)]
 fn assert_of<N: WideNode>(builder: &Builder, mesh: &TriangleMesh, rays: &[Ray], truth: &[Found]) {
     let mut bvh = builder.build_compact::<N>(mesh).expect("a build");
-    let over = bvh.over(mesh).expect("its mesh");
-    assert_all(&ask_mesh(over, rays), rays, truth);
-
+    assert_over(&bvh, mesh, rays, truth);
     let uncut = builder.splits(0.0).build_compact::<N>(mesh);
     let (mut ordered, new) = uncut.expect("a build").reorder(mesh).expect("its mesh");
     let in_order = TriangleMesh::new(&new.positions, &new.indices).expect("a mesh");
-    let over = ordered.over(&in_order).expect("its mesh");
-    assert_all(&ask_mesh(over, rays), rays, &of_mesh(&in_order, rays));
+    assert_over(&ordered, &in_order, rays, &of_mesh(&in_order, rays));
 
     // No triangle loses its area by that, or gains one.
-    let turned = mesh.positions().iter().map(|&[x, y, z]| [z, -x, y]);
-    let turned: Vec<_> = turned.collect();
-    let turned = TriangleMesh::new(&turned, mesh.indices()).expect("a mesh");
-    bvh.refit(&turned).expect("the same triangles");
-    let over = bvh.over(&turned).expect("its mesh");
-    assert_all(&ask_mesh(over, rays), rays, &of_mesh(&turned, rays));
-    let positions = new
-        .vertices
-        .iter()
-        .map(|&vertex| turned.positions()[vertex as usize]);
-    let positions: Vec<_> = positions.collect();
-    let in_order = TriangleMesh::new(&positions, &new.indices).expect("a mesh");
-    ordered.refit(&in_order).expect("the same triangles");
-    let over = ordered.over(&in_order).expect("its mesh");
-    assert_all(&ask_mesh(over, rays), rays, &of_mesh(&in_order, rays));
+    let turned = |&[x, y, z]: &[f32; 3]| [z, -x, y];
+    let positions: Vec<_> = mesh.positions().iter().map(turned).collect();
+    let moved = TriangleMesh::new(&positions, mesh.indices()).expect("a mesh");
+    bvh.refit(&moved).expect("the same triangles");
+    assert_over(&bvh, &moved, rays, &of_mesh(&moved, rays));
+    let positions: Vec<_> = new.positions.iter().map(turned).collect();
+    let moved = TriangleMesh::new(&positions, &new.indices).expect("a mesh");
+    ordered.refit(&moved).expect("the same triangles");
+    assert_over(&ordered, &moved, rays, &of_mesh(&moved, rays));
+}
+
+fn assert_over<N: WideNode, O: Order>(
+    bvh: &Bvh<N, Runs<(), O>, Owned>,
+    mesh: &TriangleMesh,
+    rays: &[Ray],
+    truth: &[Found],
+) {
+    let over = bvh.over(mesh).expect("its mesh");
+    assert_all(&ask_mesh(over, rays), rays, truth);
 }

@@ -11,7 +11,7 @@ use crate::{
 use std::vec::Vec;
 
 /// So many nodes are made in one go.
-const CHUNK: usize = 1 << 9;
+pub(super) const CHUNK: usize = 1 << 9;
 
 /// A hierarchy of nodes as wide, of the same boxes or somewhat larger ones.
 ///

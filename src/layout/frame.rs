@@ -52,7 +52,7 @@ impl Frame {
             let step = (f64::from(end) - f64::from(origin)) / 255.0;
             frame.steps[axis] = ((step as f32).to_bits() >> 23).max(LEAST_STEP.into()) as u8;
             // The step was rounded down to a power of two; and so is the plane, to a float.
-            while frame.ends_before(axis, end) {
+            while frame.plane(axis, u8::MAX) < end {
                 frame.steps[axis] += 1;
             }
             if let Some(face) = frame.main_face(axis, &sides, count) {
@@ -135,50 +135,44 @@ impl Frame {
 
     /// The numbers of the last planes that are not above coordinates, which are not below the first.
     fn below<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [u8; W] {
-        let mut numbers = self.numbers(axis, all);
-        loop {
-            let mut any = false;
-            for (number, &x) in numbers.iter_mut().zip(all) {
-                let is_above = (*number > 0.0) & (self.plane_at(axis, *number) > x);
-                *number -= if is_above { 1.0 } else { 0.0 };
-                any |= is_above;
-            }
-            if !any {
-                return bytes(&numbers);
-            }
-        }
+        self.nearest(axis, all, (-1.0, 0.0), |plane, x| plane > x)
     }
 
     /// The numbers of the first planes that are not below coordinates, or of the last if there is none.
     fn above<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [u8; W] {
-        let mut numbers = self.numbers(axis, all);
-        loop {
-            let mut any = false;
-            for (number, &x) in numbers.iter_mut().zip(all) {
-                let is_below = (*number < 255.0) & (self.plane_at(axis, *number) < x);
-                *number += if is_below { 1.0 } else { 0.0 };
-                any |= is_below;
-            }
-            if !any {
-                return bytes(&numbers);
-            }
-        }
+        self.nearest(axis, all, (1.0, 255.0), |plane, x| plane < x)
     }
 
-    /// The numbers of planes near coordinates.
+    /// The numbers of planes near coordinates, moved on by `step`, to `last` at most, for as long as they are on the wrong side.
     #[inline(always)]
-    fn numbers<const W: usize>(&self, axis: usize, all: &[f32; W]) -> [f32; W] {
+    fn nearest<const W: usize>(
+        &self,
+        axis: usize,
+        all: &[f32; W],
+        (step, last): (f32, f32),
+        is_wrong: impl Fn(f32, f32) -> bool,
+    ) -> [u8; W] {
         // No `map`, which stays a call.
         let mut numbers = [0.0; W];
         for (number, &x) in numbers.iter_mut().zip(all) {
             *number = floor(self.steps_to(axis, x)).clamp(0.0, 255.0) as f32;
         }
-        numbers
-    }
-
-    /// Whether `x`, which is not below the first plane, is above the last.
-    fn ends_before(&self, axis: usize, x: f32) -> bool {
-        self.plane(axis, u8::MAX) < x
+        loop {
+            let mut any = false;
+            for (number, &x) in numbers.iter_mut().zip(all) {
+                let moves = (*number != last) & is_wrong(self.plane_at(axis, *number), x);
+                *number += if moves { step } else { 0.0 };
+                any |= moves;
+            }
+            if !any {
+                break;
+            }
+        }
+        let mut bytes = [0; W];
+        for (byte, number) in bytes.iter_mut().zip(numbers) {
+            *byte = number as u8;
+        }
+        bytes
     }
 
     /// How many steps it is from the first plane to `x`.
@@ -204,21 +198,10 @@ impl Frame {
     }
 }
 
-/// Numbers of planes as nodes hold them.
-#[inline(always)]
-fn bytes<const W: usize>(numbers: &[f32; W]) -> [u8; W] {
-    let mut bytes = [0; W];
-    for (byte, &number) in bytes.iter_mut().zip(numbers) {
-        *byte = number as u8;
-    }
-    bytes
-}
-
 /// 2^52: from it on floats are integers.
 const INTEGERS: f64 = (1u64 << 52) as f64;
 
-/// The greatest integer that is not above `x`, which is not negative and much less than 2^52. As vectors have it, without a
-/// conversion.
+/// The greatest integer that is not above `x`, which is much less than 2^52 or an integer. As vectors have it, without a conversion.
 #[inline(always)]
 fn floor(x: f64) -> f64 {
     let nearest = (x + INTEGERS) - INTEGERS;

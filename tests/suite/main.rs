@@ -11,6 +11,7 @@ mod parts;
 mod presets;
 mod primitives;
 mod refit;
+mod refit_boxes;
 mod refit_runs;
 mod regressions;
 mod reorder;

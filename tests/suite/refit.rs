@@ -7,8 +7,7 @@ use proptest::prelude::*;
 use wide_bvh::{
     build::{BuildError, Builder, Preset, RefitError},
     geometry::{Aabb, Ray, TriangleMesh},
-    layout::{Bvh, Bvh8, Node4, Node8, Owned, TriangleLeaf, WideNode},
-    primitive::Primitives,
+    layout::{Bvh, Bvh8, Node4, Owned, TriangleLeaf, WideNode},
     reference,
 };
 use wide_bvh_scenes::shapes;
@@ -301,79 +300,5 @@ fn vertices_that_part() {
             matches!(error, RefitError::VerticesParted { .. }),
             "{error}"
         );
-    }
-}
-
-/// Boxes that are hit where they are entered.
-struct Solid(Vec<Aabb>);
-
-impl Primitives for Solid {
-    type Detail = ();
-
-    fn aabb(&self, primitive: u32) -> Aabb {
-        self.0[primitive as usize]
-    }
-
-    fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, ())> {
-        let center = self.aabb(primitive).center() - ray.origin;
-        let t = center.dot(ray.direction) / ray.direction.length_squared();
-        (t >= ray.t_min && t <= ray.t_max).then_some((t, ()))
-    }
-}
-
-#[test]
-fn boxes() {
-    let mut rng = Rng::with_seed(SEED);
-    let random = |rng: &mut Rng| {
-        let min = Vec3::new(rng.f32(), rng.f32(), rng.f32());
-        Aabb::new(min, min + 0.2 * Vec3::new(rng.f32(), rng.f32(), rng.f32()))
-    };
-    let mut solid = Solid((0..500).map(|_| random(&mut rng)).collect());
-    solid.0[3] = Aabb::EMPTY;
-    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
-        let mut bvh = Builder::new()
-            .preset(preset)
-            .build_primitives::<Node8>(&solid.0)
-            .unwrap();
-        for share in [1.0, 0.3, 0.0] {
-            let mut moved = solid.0.clone();
-            for (id, aabb) in moved.iter_mut().enumerate() {
-                if id != 3 {
-                    *aabb = if rng.f32() < share {
-                        random(&mut rng)
-                    } else {
-                        Aabb::EMPTY
-                    };
-                }
-            }
-            let moved = Solid(moved);
-            bvh.refit(&moved.0).unwrap();
-            let mut hits = 0;
-            for _ in 0..100 {
-                let origin = 3.0 * Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 1.0;
-                let ray = Ray::new(origin, Vec3::splat(0.5) - origin);
-                let expected = reference::closest_primitive(&moved, 500, &ray);
-                assert_eq!(bvh.closest_hit(&moved, &ray), expected);
-                hits += usize::from(expected.is_some());
-            }
-            assert!(hits > 0 || share == 0.0);
-        }
-        let mut wrong = solid.0.clone();
-        assert_eq!(
-            bvh.refit(&wrong[..400]),
-            Err(RefitError::PrimitiveGone { primitive: 400 })
-        );
-        wrong[3] = wrong[4];
-        assert_eq!(
-            bvh.refit(&wrong),
-            Err(RefitError::PrimitiveLeftOut { primitive: 3 })
-        );
-        wrong[100].min.x = f32::NAN;
-        let error = BuildError::NonFiniteBox { primitive: 100 };
-        let error = RefitError::Primitive {
-            primitive: 100,
-            error,
-        };
-        assert_eq!(bvh.refit(&wrong), Err(error));
     }
 }

@@ -5,12 +5,11 @@ use fastrand::Rng;
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::{
-    build::{BuildError, Builder, Preset, RefitError, ReorderedMesh},
-    geometry::{Aabb, Ray, TriangleMesh},
+    build::{Builder, Preset, RefitError, ReorderedMesh},
+    geometry::{Ray, TriangleMesh},
     layout::{
         Bvh, CompactNode4, CompactNode8, OrderedBvh8Ref, OrderedLeaf, Owned, RunLeaf, WideNode,
     },
-    primitive::Primitives,
     reference,
 };
 use wide_bvh_scenes::shapes;
@@ -253,72 +252,5 @@ fn offenders_are_named() {
         let error = refit(&moved, &indices).unwrap_err();
         assert_eq!(error.primitive(), 30);
         assert!(matches!(error, RefitError::Primitive { .. }));
-    }
-}
-
-/// Boxes that are hit in the middle.
-struct Solid(Vec<Aabb>);
-
-impl Primitives for Solid {
-    type Detail = ();
-
-    fn aabb(&self, primitive: u32) -> Aabb {
-        self.0[primitive as usize]
-    }
-
-    fn intersect(&self, primitive: u32, ray: &Ray) -> Option<(f32, ())> {
-        let center = self.aabb(primitive).center() - ray.origin;
-        let t = center.dot(ray.direction) / ray.direction.length_squared();
-        (t >= ray.t_min && t <= ray.t_max).then_some((t, ()))
-    }
-}
-
-#[test]
-fn boxes() {
-    let mut rng = Rng::with_seed(SEED);
-    let random = |rng: &mut Rng| {
-        let min = Vec3::new(rng.f32(), rng.f32(), rng.f32());
-        Aabb::new(min, min + 0.2 * Vec3::new(rng.f32(), rng.f32(), rng.f32()))
-    };
-    let mut solid = Solid((0..500).map(|_| random(&mut rng)).collect());
-    solid.0[3] = Aabb::EMPTY;
-    for builder in builders() {
-        let mut bvh: Compact<CompactNode8> = builder.build_compact_primitives(&solid.0).unwrap();
-        for share in [1.0, 0.3, 0.0] {
-            let mut moved = Solid(solid.0.clone());
-            for (_, aabb) in moved.0.iter_mut().enumerate().filter(|(id, _)| *id != 3) {
-                *aabb = match rng.f32() < share {
-                    true => random(&mut rng),
-                    false => Aabb::EMPTY,
-                };
-            }
-            bvh.refit_primitives(&moved.0).unwrap();
-            let mut hits = 0;
-            for _ in 0..100 {
-                let origin = 3.0 * Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 1.0;
-                let ray = Ray::new(origin, Vec3::splat(0.5) - origin);
-                let expected = reference::closest_primitive(&moved, 500, &ray);
-                assert_eq!(bvh.closest_hit(&moved, &ray), expected);
-                hits += usize::from(expected.is_some());
-            }
-            assert!(hits > 0 || share == 0.0);
-        }
-        let mut wrong = solid.0.clone();
-        assert_eq!(
-            bvh.refit_primitives(&wrong[..400]),
-            Err(RefitError::PrimitiveGone { primitive: 400 })
-        );
-        wrong[3] = wrong[4];
-        assert_eq!(
-            bvh.refit_primitives(&wrong),
-            Err(RefitError::PrimitiveLeftOut { primitive: 3 })
-        );
-        wrong[100].min.x = f32::NAN;
-        let error = BuildError::NonFiniteBox { primitive: 100 };
-        let primitive = 100;
-        assert_eq!(
-            bvh.refit_primitives(&wrong),
-            Err(RefitError::Primitive { primitive, error })
-        );
     }
 }

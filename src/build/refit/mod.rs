@@ -5,6 +5,7 @@ mod runs;
 mod triangles;
 
 use super::{
+    compact::CHUNK,
     error::{BuildError, RefitError},
     input::{Input, Verdict},
     parallel,
@@ -16,16 +17,6 @@ use crate::{
 use core::ops::Range;
 use glam::Vec3;
 use std::{vec, vec::Vec};
-
-/// So many nodes are made anew in one go.
-const CHUNK: usize = 1 << 9;
-
-/// Puts moved leaves in the place of what they were, with their boxes.
-fn update<N: WideNode, L: Leaf>(bvh: &mut Bvh<N, L, Owned>, leaves: Vec<L>, boxes: &[Aabb]) {
-    let (old_leaves, ..) = bvh.moving_parts();
-    *old_leaves = leaves;
-    update_nodes(bvh, |leaf| boxes[leaf]);
-}
 
 /// Makes the boxes of all nodes anew, from those of leaves, which are told by their places.
 fn update_nodes<N: WideNode, L: Leaves>(

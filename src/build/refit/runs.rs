@@ -9,7 +9,7 @@ use crate::{
     geometry::{Aabb, TriangleMesh},
     layout::{Bvh, Child, ChildKind, Order, Owned, Runs, WideNode, number_at, of_place},
 };
-use core::{array, ops::Range};
+use core::ops::Range;
 use std::{vec, vec::Vec};
 
 impl<N: WideNode, O: Order> Bvh<N, Runs<(), O>, Owned> {
@@ -82,8 +82,8 @@ impl<N: WideNode, O: Order> Bvh<N, Runs<(), O>, Owned> {
 
     /// All leaves.
     fn runs(&self) -> Vec<Range<usize>> {
-        let lanes = |node: &N| array::from_fn::<_, 8, _>(|lane| node.child(lane));
-        let below = self.nodes().iter().flat_map(lanes);
+        let nodes = self.nodes().iter();
+        let below = nodes.flat_map(|node| (0..N::WIDTH).map(|lane| node.child(lane)));
         let run = |child: Child| match child.kind() {
             ChildKind::Leaf(place) => Some(of_place(place)),
             _ => None,

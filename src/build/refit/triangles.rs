@@ -1,6 +1,6 @@
 //! Leaves that have copies of triangles.
 
-use super::{around, listed, map_all, none_is_missing, places, update};
+use super::{around, listed, map_all, none_is_missing, places, update_nodes};
 use crate::{
     build::{
         error::RefitError,
@@ -55,7 +55,8 @@ impl<N: WideNode> Bvh<N, TriangleLeaf, Owned> {
         let leaves = map_all(self.leaves(), moved)?;
         none_is_missing(&Triangles(mesh), listed(self))?;
         let (leaves, boxes): (_, Vec<Aabb>) = leaves.into_iter().unzip();
-        update(self, leaves, &boxes);
+        *self.moving_parts().0 = leaves;
+        update_nodes(self, |leaf| boxes[leaf]);
         Ok(())
     }
 }
