@@ -213,7 +213,18 @@ pub trait Triangles: Copy {
         ray: &RayShear,
         t_max: f32,
     ) -> Option<TriangleHits<Self::Lanes<S>>> {
-        let look = self.look(token, ray);
+        self.after_look::<S, A>(token, ray, self.look(token, ray), t_max)
+    }
+
+    /// The same after a look at them.
+    #[inline(always)]
+    fn after_look<S: Simd, A: Aim>(
+        self,
+        token: S,
+        ray: &RayShear,
+        look: Look<Self::Lanes<S>>,
+        t_max: f32,
+    ) -> Option<TriangleHits<Self::Lanes<S>>> {
         if !look.may_hit() {
             return None;
         }

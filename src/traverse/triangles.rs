@@ -13,7 +13,7 @@ use crate::{
     simd::{Lanes, Operation, Simd},
     slab::{NarrowRay, PreparedRay},
 };
-use core::{hint::select_unpredictable, ops::ControlFlow};
+use core::ops::ControlFlow;
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// The closest triangle that the ray hits: of all within its range the one of least `t`, of equal
@@ -92,35 +92,6 @@ impl Found {
             any_closer |= found.compare(best, t_max, primitives);
         }
         any_closer
-    }
-
-    /// [`choose`](Self::choose) without a branch that is hard to guess.
-    #[inline(always)]
-    pub(super) fn choose_unbranched<V: Lanes>(
-        best: &mut Option<Self>,
-        t_max: &mut f32,
-        leaf: impl Triangles,
-        hits: TriangleHits<V>,
-        primitives: &[u32],
-    ) {
-        let (t, u, v) = (hits.t.to_array(), hits.u.to_array(), hits.v.to_array());
-        let (t, u, v) = (t.as_ref(), u.as_ref(), v.as_ref());
-        let lane = hits.mask.trailing_zeros() as usize % t.len();
-        let some = hits.mask != 0;
-        let many = hits.mask & hits.mask.wrapping_sub(1) != 0;
-        if many || best.is_some() && t[lane] == *t_max {
-            Self::choose(best, t_max, leaf, hits, primitives);
-            return;
-        }
-        let old = best.unwrap_or_default();
-        *t_max = select_unpredictable(some, t[lane], *t_max);
-        let new = Self {
-            t: select_unpredictable(some, t[lane], old.t),
-            u: select_unpredictable(some, u[lane], old.u),
-            v: select_unpredictable(some, v[lane], old.v),
-            place: select_unpredictable(some, leaf.first() + lane, old.place),
-        };
-        *best = (some || best.is_some()).then_some(new);
     }
 
     /// Becomes the best one if it is. Whether it did.

@@ -5,7 +5,7 @@ use crate::common::{SEED, bits};
 use fastrand::Rng;
 use glam::Vec3;
 use wide_bvh::{
-    build::Builder,
+    build::{Builder, Preset},
     geometry::{Hit, Ray, TriangleMesh},
     layout::{Bvh, CompactBvh8, Node4, Node8, Storage, TriangleLeaves, WideNode},
     reference,
@@ -14,14 +14,30 @@ use wide_bvh::{
 };
 use wide_bvh_scenes::{Mesh, shapes};
 
-/// A soup, a closed mesh of fine triangles, one that lies on a grid, and large triangles.
+/// A soup, a closed mesh of fine triangles, one that lies on a grid, large triangles, and surfaces that are there twice or more.
 fn meshes() -> Vec<Mesh> {
     vec![
         shapes::soup(150, SEED),
         shapes::icosphere(3),
         shapes::quantised(shapes::icosphere(2), 6),
         shapes::cuboid([-1.0; 3], [1.0; 3]),
+        doubled(shapes::icosphere(2)),
     ]
+}
+
+/// Each triangle two to four times, turned any way around, all in any order: what is hit is as near as others, in its leaf
+/// and in others.
+fn doubled(mut mesh: Mesh) -> Mesh {
+    let mut rng = Rng::with_seed(SEED);
+    let once = mesh.indices.clone();
+    for &[a, b, c] in &once {
+        for _ in 0..rng.usize(1..4) {
+            mesh.indices
+                .push([[b, c, a], [c, b, a], [a, b, c]][rng.usize(0..3)]);
+        }
+    }
+    rng.shuffle(&mut mesh.indices);
+    mesh
 }
 
 /// Runs of rays that are alike, and of rays that are not, so long that bundles, waves and the ends of both are met.
@@ -112,10 +128,13 @@ fn on_all(mut check: impl FnMut(&dyn Batches, &[Ray], &[Option<Hit>])) {
         for backend in Backend::available() {
             let mut eight = Builder::new().build_as::<Node8>(&view).unwrap();
             let mut four = Builder::new().build_as::<Node4>(&view).unwrap();
+            let mut fast = Builder::new().preset(Preset::Fast).build(&view).unwrap();
             eight.set_backend(backend);
             four.set_backend(backend);
+            fast.set_backend(backend);
             check(&eight, &rays, &hits);
             check(&four, &rays, &hits);
+            check(&fast, &rays, &hits);
             let mut compact: CompactBvh8 = Builder::new().build_compact(&view).unwrap();
             compact.set_backend(backend);
             check(&compact.over(&view).unwrap(), &rays, &hits);
