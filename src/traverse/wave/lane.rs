@@ -258,13 +258,12 @@ impl Lane {
         self.forget_the_far(token);
     }
 
-    /// Goes on to the stack's last entry, or the end. Whether that counts as a leaf.
+    /// Goes on to the stack's last entry, or the end.
     #[inline(always)]
-    pub(super) fn take_last(&mut self) -> bool {
+    pub(super) fn take_last(&mut self) {
         // SAFETY: `top` and those below were written.
         self.current = unsafe { self.links.get_unchecked(self.top as usize).assume_init() };
         self.top = self.top.wrapping_sub(1);
-        self.current.is_leaf()
     }
 
     /// Takes from the stack what is too far now.

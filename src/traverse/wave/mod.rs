@@ -135,7 +135,10 @@ pub(super) fn trace<
         for (at, count) in [(&at_hit, one), (&at_hits, many), (&at_miss, misses)] {
             for place in 0..count {
                 let lane = at.get(place);
-                let leaf = in_list(lane).take_last();
+                let state = in_list(lane);
+                state.take_last();
+                fetch(token, bvh, state.current(), is_large);
+                let leaf = state.current().is_leaf();
                 at_node.push_if(&mut nodes, lane, !leaf);
                 at_rest.push_if(&mut rest, lane, leaf);
             }
