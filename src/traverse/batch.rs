@@ -20,7 +20,7 @@ const LANES: usize = 32;
 /// As many rays are sorted out before those left over are interleaved.
 const WINDOW: usize = feed::GROUPS * bundle::RAYS;
 
-/// What `LANES` rays under way at a time are kept in, for batches on small stacks; 1 to 64 of them, some 2.3 KiB each.
+/// What `LANES` rays under way at a time are kept in, for batches on small stacks; 1 to 64 of them, some 2.4 KiB each.
 ///
 /// It need not be cleared between batches, and fits any hierarchy of triangles.
 pub struct Scratch<const LANES: usize>([MaybeUninit<Lane>; LANES]);
@@ -53,7 +53,7 @@ impl<const LANES: usize> fmt::Debug for Scratch<LANES> {
 /// the tree side by side; others are interleaved, where the [backend](crate::simd::Backend) is faster so (AVX2 and AVX-512), and
 /// else traced one after the other. Nobody need say which are which.
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
-    /// The [closest hit](Self::closest_hit) of each ray. Takes up to 90 KiB of stack, where this crate is optimised.
+    /// The [closest hit](Self::closest_hit) of each ray. Takes up to 96 KiB of stack, where this crate is optimised.
     ///
     /// ```
     /// # use wide_bvh::{Builder, Ray, TriangleMesh};
@@ -74,7 +74,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         });
     }
 
-    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 90 KiB of stack, where this crate is optimised.
+    /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 96 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,

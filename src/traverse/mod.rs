@@ -3,7 +3,7 @@
 //! | over triangles | asked of | besides |
 //! | --- | --- | --- |
 //! | [`closest_hit`](crate::layout::Bvh#method.closest_hit), [`any_hit`](crate::layout::Bvh#method.any_hit) | a ray | 8 KiB of stack |
-//! | [`closest_hits`](crate::layout::Bvh::closest_hits), [`any_hits`](crate::layout::Bvh::any_hits) | any number of rays, in any order: faster | 90 KiB of stack |
+//! | [`closest_hits`](crate::layout::Bvh::closest_hits), [`any_hits`](crate::layout::Bvh::any_hits) | any number of rays, in any order: faster | 96 KiB of stack |
 //! | [`closest_hits_in`](crate::layout::Bvh::closest_hits_in), [`any_hits_in`](crate::layout::Bvh::any_hits_in) | the same | a [`Scratch`] of yours, 9 KiB of stack |
 //! | `par_closest_hits`, `par_any_hits` | the same, on all cores | the feature `rayon` |
 //! | [`closest_hit_packet`](crate::layout::Bvh::closest_hit_packet), [`any_hit_packet`](crate::layout::Bvh::any_hit_packet) | up to 64 rays, some of them inactive | 36 KiB of stack |

@@ -2,11 +2,13 @@
 //!
 //! A ray alone waits: for its node to be loaded, for the boxes to be tested, for what was guessed wrong. Here some are under
 //! way together, and one's wait is another's work. What follows from a step is hardly branched on, for it cannot be guessed:
-//! a node's children are written to the ray's stack by a permutation, the nearest hit is kept by selection, and the ray goes
-//! to the list of those at a node, at a leaf, with a hit, or at their end. A step is in parts, of which each is done for another ray than
-//! the one before it: a processor sees a few hundred instructions ahead, and one ray's step from its node's place to the next
-//! one's, or from its leaf to what is left on its stack, is longer than that allows to hide. So what the one thing that is
-//! branched on, a first look at a leaf, has shown is known by the time it is asked for, and a wrong guess costs little.
+//! a node's children are written to the ray's stack by a permutation, and the ray goes to the list of those at a node, at a
+//! leaf, with a hit, with several, with none, or at their end.
+//!
+//! A step is in parts, of which each is done for another ray than the one before it: a processor sees a few hundred
+//! instructions ahead, and one ray's step from its node's place to the next one's, or from its leaf to what is left on its
+//! stack, is longer than that allows to hide. So what the one thing that is branched on, a first look at a leaf, has shown
+//! is known by the time it is asked for, and a wrong guess costs little.
 //!
 //! Children on the stack are in the order of lanes, but for the nearest, which comes next.
 //!
