@@ -55,7 +55,7 @@ pub(super) struct Tested<'a, T: Simd, N: WideNode> {
 pub(super) type LookAt<'a, T, L> = Look<<<L as Leaves>::Ref<'a> as Triangles>::Lanes<T>>;
 
 impl Lane {
-    /// Writes as much of a lane's stacks as is read whether it is in use or not.
+    /// Writes what of a lane is there whether it is in use or not: hits, and as much of its stacks as is read then.
     ///
     /// # Safety
     /// `lane` may be written.
@@ -190,8 +190,8 @@ impl Lane {
         leaf.look(token, &self.shear())
     }
 
-    /// Tests the leaf's triangles after a look at them. A bit for each that is hit, or if it is enough to know whether any is, any
-    /// bit; [`hits`](Self::hits) are then those.
+    /// Tests the leaf's triangles after a look at them. A bit for each that is hit, which are then its hits; or any bit, if it is
+    /// enough to know whether any is.
     #[inline(always)]
     pub(super) fn test_leaf<'a, T: Simd, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
         &mut self,

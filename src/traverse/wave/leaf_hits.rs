@@ -58,7 +58,7 @@ impl LeafHits {
         lanes.next();
         for lane in lanes {
             let other = self.get(lane);
-            // Both numbers are read, for there to be no branch on which is nearer.
+            // The rule of `Found::compare`, but both numbers are read, for there to be no branch on which is nearer.
             let [a, b] = [other.place, nearest.place].map(|place| number_at(primitives, place));
             let is_nearer = (other.t < nearest.t) | (other.t == nearest.t) & (a < b);
             nearest = select_unpredictable(is_nearer, other, nearest);
