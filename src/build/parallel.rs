@@ -34,7 +34,10 @@ pub(super) fn map<T: Send, R: Send>(
     {
         use rayon::prelude::*;
         let items: Vec<T> = items.into_iter().collect();
-        items.into_par_iter().map(make).collect()
+        if items.len() > 1 {
+            return items.into_par_iter().map(make).collect();
+        }
+        items.into_iter().map(make).collect()
     }
     #[cfg(not(feature = "rayon"))]
     items.into_iter().map(make).collect()

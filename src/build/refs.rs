@@ -175,9 +175,11 @@ impl Refs {
         let gathered = gather(input, drop_non_finite, watch, Ref::NONE, Ref::new)?;
         let scale = gathered.bounds.measure().scale();
         let mut refs = gathered.all;
-        for r in &mut refs {
-            *r = r.scaled(scale);
-        }
+        parallel::map(refs.chunks_mut(CHUNK), |refs| {
+            for r in refs {
+                *r = r.scaled(scale);
+            }
+        });
         Ok(Self {
             refs,
             dropped: gathered.dropped,

@@ -5,6 +5,8 @@
 //! are made, the best first. Unlike there, moves are made one after the other: it takes little of the time, and
 //! the outcome is the same on any number of threads.
 
+mod candidates;
+
 use super::{
     BuildError,
     assembly::Assembly,
@@ -16,6 +18,8 @@ use super::{
     parallel::{self, join},
     refs::Bounds,
 };
+use candidates::Candidates;
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use glam::Vec3;
 use std::{vec, vec::Vec};
 use wide::f32x4;
@@ -36,6 +40,9 @@ pub(super) struct Effort {
 const LOOKS_PER_NODE: usize = 100;
 /// How many nodes a subtree may look below. In six scenes it is 20 on average and never more than 64.
 const MOST_LOOKS: usize = 128;
+
+/// So many nodes are one task where little is done with each.
+const CHUNK: usize = 1 << 14;
 
 /// With threads, so many levels of the changed tree are above parts that are put in order at once.
 const LEVELS: u32 = 6;
@@ -91,19 +98,18 @@ pub(super) fn optimize(
     let measure = Measure::of_bounds(&root.aabb);
     let mut spots = spots(tree.nodes(), &measure);
     let mut touched = vec![false; spots.len()];
-    let mut rests = pages::filled(Rest::default(), spots.len());
+    let mut candidates = Candidates::new(spots.len());
     let least_gain = effort.least_gain * spots.iter().map(|spot| f64::from(spot.area)).sum::<f64>();
-    let mut keys = pages::with_capacity(spots.len());
     let mut looks = 0;
     for _ in 0..effort.rounds {
-        let candidates = candidates(&spots, &mut rests, effort.share, &mut keys);
+        let looking = candidates.next(&spots, spots.len() / effort.share + 1);
         let find = |&from: &u32| match watch.advance(1) {
             true => find(&spots, from),
             false => Search::NONE,
         };
-        let searches = parallel::map(&candidates, find);
-        for (&from, search) in candidates.iter().zip(&searches) {
-            rests[from as usize].note(search.best.is_some());
+        let searches = parallel::map(&looking, find);
+        for (&from, search) in looking.iter().zip(&searches) {
+            candidates.note(from, search.best.is_some());
             looks += search.looks;
         }
         let mut moves: Vec<_> = searches.iter().filter_map(|search| search.best).collect();
@@ -124,72 +130,42 @@ pub(super) fn optimize(
 }
 
 fn spots(nodes: &[BinaryNode], measure: &Measure) -> Vec<Spot> {
+    let parents = parents(nodes);
     let vector = |v: Vec3| f32x4::new([v.x, v.y, v.z, 0.0]) * measure.scale();
-    let mut spots = pages::with_capacity(nodes.len());
-    spots.extend(nodes.iter().zip(0..).map(|(node, index)| {
-        let bounds = Bounds {
-            min: vector(node.aabb.min),
-            max: vector(node.aabb.max),
-        };
-        Spot {
-            bounds,
-            area: bounds.half_area(),
-            parent: 0,
-            first: match node.is_leaf() {
-                true => index,
-                false => node.first,
-            },
-            count: node.count,
+    pages::made(nodes.len(), CHUNK, |first, spots| {
+        for index in first..first + spots.left() {
+            let node = &nodes[index];
+            let bounds = Bounds {
+                min: vector(node.aabb.min),
+                max: vector(node.aabb.max),
+            };
+            spots.push(Spot {
+                bounds,
+                area: bounds.half_area(),
+                parent: parents[index].load(Relaxed),
+                first: match node.is_leaf() {
+                    true => index as u32,
+                    false => node.first,
+                },
+                count: node.count,
+            });
         }
-    }));
-    for (index, node) in nodes.iter().enumerate() {
-        if !node.is_leaf() {
-            for child in node.children() {
-                spots[child].parent = index as u32;
+    })
+}
+
+/// The parent of every node; 0 of the root. Atomic as threads write them, each child's once.
+fn parents(nodes: &[BinaryNode]) -> Vec<AtomicU32> {
+    let parents: Vec<_> = nodes.iter().map(|_| AtomicU32::new(0)).collect();
+    parallel::map(nodes.chunks(CHUNK).enumerate(), |(chunk, nodes)| {
+        for (node, index) in nodes.iter().zip(chunk * CHUNK..) {
+            if !node.is_leaf() {
+                for child in node.children() {
+                    parents[child].store(index as u32, Relaxed);
+                }
             }
         }
-    }
-    spots
-}
-
-/// For how many rounds a node that found no better place does not look again: one more each time.
-#[derive(Clone, Copy, Default)]
-struct Rest {
-    left: u8,
-    next: u8,
-}
-
-impl Rest {
-    fn note(&mut self, found: bool) {
-        *self = match found {
-            true => Self::default(),
-            false => Self {
-                left: self.next,
-                next: self.next.saturating_add(1),
-            },
-        };
-    }
-}
-
-/// The nodes of the largest area, of which there is the most to be gained, but for those that rest.
-/// `keys` is memory to be used again.
-fn candidates(spots: &[Spot], rests: &mut [Rest], share: usize, keys: &mut Vec<u64>) -> Vec<u32> {
-    let count = spots.len() / share + 1;
-    // The areas' bits, which are in their order as none is negative, upside down for the largest first;
-    // and the nodes.
-    keys.clear();
-    for (index, (spot, rest)) in spots.iter().zip(rests).enumerate().skip(1) {
-        if rest.left > 0 {
-            rest.left -= 1;
-        } else {
-            keys.push((u64::from(!spot.area.to_bits()) << 32) | index as u64);
-        }
-    }
-    if count < keys.len() {
-        keys.select_nth_unstable(count);
-        keys.truncate(count);
-    }
-    keys.iter().map(|&key| key as u32).collect()
+    });
+    parents
 }
 
 /// The other child of a node's parent. Children are neighbours, and only the root comes before them.
