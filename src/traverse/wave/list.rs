@@ -1,4 +1,4 @@
-//! Lanes by what is next for them.
+//! Lists of lanes.
 
 use super::{Lane, MOST_LANES};
 use core::ptr;

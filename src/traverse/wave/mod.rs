@@ -50,8 +50,7 @@ pub(super) fn trace<
 ) {
     const { assert!(0 < LANES && LANES <= MOST_LANES) };
     // Lengths apart from what they are of, and both from all else, so that they stay in registers.
-    let (mut at_node, mut at_rest) = (List::EMPTY, List::EMPTY);
-    let (mut nodes, mut rest) = (0, 0);
+    let (mut next, mut lens) = (Next::NONE, NextLens::default());
     // What comes after nodes, and after leaves.
     let (mut at_leaf, mut at_end) = (List::EMPTY, List::EMPTY);
     let (mut at_hit, mut at_hits, mut at_miss) = (List::EMPTY, List::EMPTY, List::EMPTY);
@@ -69,38 +68,34 @@ pub(super) fn trace<
         unsafe { Lane::clear(lane) };
         // SAFETY: the same.
         let started = unsafe { Lane::start(lane, root, feed) };
-        let leaf = root.is_leaf();
-        at_node.push_if(&mut nodes, lane, started & !leaf);
-        at_rest.push_if(&mut rest, lane, started & leaf);
+        next.push_if(&mut lens, lane, root, started);
     }
     loop {
         // Leaves wait for company until few rays are at nodes.
-        if nodes > LANES / 4 || rest == 0 {
-            if nodes == 0 {
+        if lens.nodes > LANES / 4 || lens.rest == 0 {
+            if lens.nodes == 0 {
                 return;
             }
-            let count = take(&mut nodes);
+            let count = take(&mut lens.nodes);
             // For there to be one ahead of the last.
-            at_node.repeat_last(count);
-            let mut tested = in_list(at_node.get(0)).test_boxes(token, bvh);
+            next.at_node.repeat_last(count);
+            let mut tested = in_list(next.at_node.get(0)).test_boxes(token, bvh);
             let mut before = root;
             for place in 0..count {
-                let lane = at_node.get(place);
-                let ahead = in_list(at_node.get(place + 1)).test_boxes(token, bvh);
+                let lane = next.at_node.get(place);
+                let ahead = in_list(next.at_node.get(place + 1)).test_boxes(token, bvh);
                 let state = in_list(lane);
                 state.take_children::<T, N, Q>(token, &tested);
                 fetch(token, bvh, before, is_large);
                 (tested, before) = (ahead, state.current());
-                let leaf = before.is_leaf();
-                at_node.push_if(&mut nodes, lane, !leaf);
-                at_rest.push_if(&mut rest, lane, leaf);
+                next.push_if(&mut lens, lane, before, true);
             }
             fetch(token, bvh, before, is_large);
             continue;
         }
         let (mut leaves, mut ends) = (0, 0);
-        for place in 0..take(&mut rest) {
-            let lane = at_rest.get(place);
+        for place in 0..take(&mut lens.rest) {
+            let lane = next.at_rest.get(place);
             let end = in_list(lane).has_ended();
             at_leaf.push_if(&mut leaves, lane, !end);
             at_end.push_if(&mut ends, lane, end);
@@ -140,9 +135,7 @@ pub(super) fn trace<
                 let state = in_list(lane);
                 state.take_last();
                 fetch(token, bvh, state.current(), is_large);
-                let leaf = state.current().is_leaf();
-                at_node.push_if(&mut nodes, lane, !leaf);
-                at_rest.push_if(&mut rest, lane, leaf);
+                next.push_if(&mut lens, lane, state.current(), true);
             }
         }
         for place in 0..ends {
@@ -150,10 +143,37 @@ pub(super) fn trace<
             in_list(lane).answer(feed);
             // SAFETY: it is one of them.
             let started = unsafe { Lane::start(lane, root, feed) };
-            let leaf = root.is_leaf();
-            at_node.push_if(&mut nodes, lane, started & !leaf);
-            at_rest.push_if(&mut rest, lane, started & leaf);
+            next.push_if(&mut lens, lane, root, started);
         }
+    }
+}
+
+/// Lanes by what is next for them.
+struct Next {
+    at_node: List,
+    /// At a leaf, or at their end.
+    at_rest: List,
+}
+
+/// How many there are of [`Next`].
+#[derive(Default)]
+struct NextLens {
+    nodes: usize,
+    rest: usize,
+}
+
+impl Next {
+    const NONE: Self = Self {
+        at_node: List::EMPTY,
+        at_rest: List::EMPTY,
+    };
+
+    /// As [`List::push_if`], a lane for which this is next.
+    #[inline(always)]
+    fn push_if(&mut self, lens: &mut NextLens, lane: *mut Lane, next: Link, wanted: bool) {
+        let leaf = next.is_leaf();
+        self.at_node.push_if(&mut lens.nodes, lane, wanted & !leaf);
+        self.at_rest.push_if(&mut lens.rest, lane, wanted & leaf);
     }
 }
 
