@@ -14,6 +14,8 @@ pub struct Effort {
     pub least_sample: usize,
     /// How long builders take turns over a scene; they finish the round.
     pub builds: Duration,
+    /// How long to wait for the core to be quiet, all in all.
+    pub patience: Duration,
 }
 
 impl Effort {
@@ -23,6 +25,7 @@ impl Effort {
         tests: 200_000_000,
         least_sample: 100,
         builds: Duration::from_secs(15),
+        patience: Duration::from_secs(1200),
     };
     const QUICK: Self = Self {
         rays: 1 << 14,
@@ -30,6 +33,7 @@ impl Effort {
         tests: 20_000_000,
         least_sample: 10,
         builds: Duration::from_secs(1),
+        patience: Duration::from_secs(10),
     };
 }
 

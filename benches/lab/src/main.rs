@@ -7,6 +7,7 @@ mod error;
 mod exact;
 mod limit;
 mod output;
+mod quiet;
 mod race;
 mod reference;
 mod scenes;

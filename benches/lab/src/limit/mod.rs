@@ -176,6 +176,7 @@ mod tests {
             tests: 0,
             least_sample: 0,
             builds: Duration::ZERO,
+            patience: Duration::ZERO,
         };
         for workload in workloads(&scene, &bvh, effort.rays) {
             for ray in &workload.rays {

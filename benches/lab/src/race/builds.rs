@@ -1,7 +1,7 @@
 //! Building, builder by builder, on one thread and on two.
 
 use super::{Course, measure, progress, record::Record, turns};
-use crate::{effort::Effort, engines::Builder, stats::median};
+use crate::{effort::Effort, engines::Builder, quiet::Quiet, stats::median};
 use fastrand::Rng;
 use std::{error::Error, time::Instant};
 
@@ -19,6 +19,7 @@ pub fn race(
     course: &Course<'_>,
     builders: &[Builder<'_>],
     effort: &Effort,
+    quiet: &mut Quiet,
 ) -> Result<Vec<Record>, Box<dyn Error>> {
     let traced = |trial: &&super::Trial| trial.workload.name == TRACED;
     let Some(trial) = course.trials.iter().find(traced) else {
@@ -52,7 +53,7 @@ pub fn race(
             progress.inc(1);
         }
     }
-    let scores = measure(trial, &trees, effort.rounds, &progress);
+    let scores = measure(trial, &trees, effort.rounds, quiet, &progress);
     progress.finish_and_clear();
 
     let trees = trees.iter().zip(scores);

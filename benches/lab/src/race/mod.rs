@@ -4,7 +4,8 @@
 //! Figures move by tens of per cent from one minute to the next on a shared machine, so engines take
 //! turns: each round traces the workload once with every engine, in another order each time, and the
 //! median of the rounds is the figure. Orders are random, and the same in every run: an engine that always
-//! came after another over the same tree would always find that in the caches.
+//! came after another over the same tree would always find that in the caches. While another program shares the
+//! core, a turn waits.
 
 mod builds;
 mod rays;
@@ -15,9 +16,9 @@ use crate::{
     effort::{self, Effort},
     engines::{self, Batch, Engine},
     output,
+    quiet::{Quiet, median_seconds},
     reference::Sample,
     scenes,
-    stats::median,
     workloads::{Query, Workload, workloads},
 };
 use fastrand::Rng;
@@ -27,7 +28,6 @@ use std::{
     hint::black_box,
     io::{self, Write},
     path::PathBuf,
-    time::Instant,
 };
 use wide_bvh::{
     build::Builder,
@@ -41,7 +41,8 @@ use wide_bvh_scenes::Mesh;
 /// `random`, from one point of the scene's bounds towards another, without end; `shadow`, any hit
 /// between each primary hit and a light. They are seeded, and the same for every engine.
 ///
-/// Engines take turns in random orders, round by round; the median of the rounds is the figure. All are
+/// Engines take turns in random orders, round by round; the median of the rounds is the figure. On shared
+/// machines a turn waits for its core to be quiet, for 20 minutes in all at most. All are
 /// built by one thread, too, from the vertex and index buffers to the first ray. Bytes a triangle are what
 /// an engine keeps besides those buffers.
 ///
@@ -111,6 +112,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let json = output::create(args.json.as_deref())?;
     let effort = args.effort.effort();
     let chosen = |name: &str| args.chosen(name);
+    let quiet = &mut Quiet::new(effort.patience);
 
     let (mut traced, mut built) = (Vec::new(), Vec::new());
     let mut out = io::stdout();
@@ -118,21 +120,26 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     for scene in &scenes {
         let course = Course::new(scene, &effort)?;
         if args.races(Part::Rays) {
-            let results = rays::race(&course, &engines::all(&course.mesh, &chosen)?, &effort)?;
+            let results = rays::race(
+                &course,
+                &engines::all(&course.mesh, &chosen)?,
+                &effort,
+                quiet,
+            )?;
             write!(out, "\n{}", table::rays::of_scene(&results))?;
             traced.extend(results);
         }
         if args.races(Part::Builds) {
             let mut builders = engines::builders(&course.mesh);
             builders.retain(|builder| chosen(builder.name));
-            let results = builds::race(&course, &builders, &effort)?;
+            let results = builds::race(&course, &builders, &effort, quiet)?;
             write!(out, "\n{}", table::builds::of_scene(&results))?;
             built.extend(results);
         }
     }
     write!(out, "{}", table::rays::means(&traced))?;
     write!(out, "{}", table::builds::means(&built))?;
-    writeln!(out, "{}", table::legend())?;
+    writeln!(out, "{}", table::legend(quiet.turns()))?;
     if let Some(file) = json {
         traced.extend(built);
         serde_json::to_writer_pretty(file, &traced)?;
@@ -196,6 +203,7 @@ fn measure(
     Trial { workload, sample }: &Trial,
     engines: &[Box<dyn Engine + '_>],
     rounds: usize,
+    quiet: &mut Quiet,
     progress: &ProgressBar,
 ) -> Vec<Score> {
     let mut answers = Answers::new(workload.rays.len());
@@ -213,21 +221,20 @@ fn measure(
             answers.wrong(sample, workload.query, engine.is_exact())
         })
         .collect();
-    let mut seconds = vec![Vec::with_capacity(rounds); engines.len()];
+    let mut timed: Vec<_> = engines.iter().map(|_| Vec::with_capacity(rounds)).collect();
     let mut rng = Rng::with_seed(1);
     for _ in 0..rounds {
         for engine in turns(engines.len(), &mut rng) {
-            let start = Instant::now();
-            answers.trace(&*batches[engine], workload.query);
-            seconds[engine].push(start.elapsed().as_secs_f64());
+            let turn = quiet.time(|| answers.trace(&*batches[engine], workload.query));
+            timed[engine].push(turn);
             progress.inc(1);
         }
     }
-    seconds
-        .into_iter()
+    timed
+        .iter()
         .zip(disagreements)
-        .map(|(seconds, disagreements)| Score {
-            mrays_per_s: workload.rays.len() as f64 / median(seconds) / 1e6,
+        .map(|(turns, disagreements)| Score {
+            mrays_per_s: workload.rays.len() as f64 / median_seconds(turns) / 1e6,
             disagreements,
         })
         .collect()
@@ -274,6 +281,7 @@ mod tests {
         tests: 100_000,
         least_sample: 1,
         builds: Duration::ZERO,
+        patience: Duration::ZERO,
     };
 
     #[test]
@@ -281,7 +289,8 @@ mod tests {
         let scene = wide_bvh_scenes::shapes::cuboid([-1.0; 3], [1.0; 3]);
         let course = Course::new(&scene, &EFFORT).unwrap();
         let engines = engines::all(&course.mesh, &|_| true).unwrap();
-        let records = rays::race(&course, &engines, &EFFORT).unwrap();
+        let records =
+            rays::race(&course, &engines, &EFFORT, &mut Quiet::new(EFFORT.patience)).unwrap();
         assert_eq!(records.len(), workloads::NAMES.len() * engines.len());
         for record in records {
             assert!(record.mrays_per_s > 0.0 && record.bytes_per_triangle > 0.0);
@@ -298,7 +307,13 @@ mod tests {
         let scene = wide_bvh_scenes::shapes::torus_knot(2, 3, 0.2, 100, 12);
         let course = Course::new(&scene, &EFFORT).unwrap();
         let builders = engines::builders(&course.mesh);
-        let records = builds::race(&course, &builders, &EFFORT).unwrap();
+        let records = builds::race(
+            &course,
+            &builders,
+            &EFFORT,
+            &mut Quiet::new(EFFORT.patience),
+        )
+        .unwrap();
         assert_eq!(records.len(), 2 * builders.len());
         for record in records {
             assert!(record.build_ms > 0.0 && record.mrays_per_s > 0.0);

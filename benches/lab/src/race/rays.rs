@@ -1,7 +1,7 @@
 //! Tracing, engine by engine.
 
 use super::{Course, Engine, measure, progress, record::Record};
-use crate::effort::Effort;
+use crate::{effort::Effort, quiet::Quiet};
 use std::error::Error;
 
 /// One scene: a record of each engine on each workload.
@@ -9,12 +9,13 @@ pub fn race(
     course: &Course<'_>,
     engines: &[Box<dyn Engine + '_>],
     effort: &Effort,
+    quiet: &mut Quiet,
 ) -> Result<Vec<Record>, Box<dyn Error>> {
     let progress = progress(course.trials.len() * engines.len() * (effort.rounds + 1))?;
     let mut records = Vec::new();
     for trial in &course.trials {
         progress.set_message(format!("{} {}", course.name, trial.workload.name));
-        let scores = measure(trial, engines, effort.rounds, &progress);
+        let scores = measure(trial, engines, effort.rounds, quiet, &progress);
         for (engine, score) in engines.iter().zip(scores) {
             let built = engine.built();
             records.push(Record {

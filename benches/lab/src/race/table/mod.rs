@@ -12,11 +12,12 @@ const YARDSTICK: &str = "embree HIGH";
 /// How this crate's engines are told from others.
 const OURS: &str = "wide-bvh ";
 
-/// What the columns mean.
-pub fn legend() -> String {
+/// What the columns mean. Of so many turns so many were disturbed.
+pub fn legend((turns, disturbed): (usize, usize)) -> String {
     format!(
         "
 Figures: million rays a second, the median of the rounds; one thread. In brackets: times {YARDSTICK}.
+While another program shared the core: {disturbed} of {turns} turns, which count where an engine had no three others.
 Build: by one thread. Bytes a triangle: what is kept besides the vertex and index buffers.
 Wrong: of a sample of the rays ({}), those answered otherwise than by brute force.
 For {OURS}engines but approximate and reordered ones one bit of t, u, v or the triangle's number is enough; for
