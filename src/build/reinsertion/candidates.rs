@@ -51,18 +51,16 @@ impl Candidates {
         parallel::map(parts.enumerate(), |(index, ((rests, spots), awake))| {
             awake.gather(index * CHUNK, rests, spots);
         });
+        let mut counts = [0; BINS];
+        for awake in &self.chunks {
+            for (all, count) in counts.iter_mut().zip(&awake.counts) {
+                *all += *count as usize;
+            }
+        }
         // All up to some bin are taken, and of the next one those of the largest area.
         let (mut last, mut taken) = (0, 0);
-        while last < BINS {
-            let more: usize = self
-                .chunks
-                .iter()
-                .map(|awake| awake.counts[last] as usize)
-                .sum();
-            if taken + more > count {
-                break;
-            }
-            taken += more;
+        while last < BINS && taken + counts[last] <= count {
+            taken += counts[last];
             last += 1;
         }
         let parted = parallel::map(&self.chunks, |awake| awake.part(last));
