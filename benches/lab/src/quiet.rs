@@ -1,7 +1,8 @@
 //! Whether the core is ours alone.
 //!
 //! On a rented machine another's program may run on the core's other thread, for seconds at a time. What keeps a core's units
-//! busy slows down more then than what waits for its own results, so figures of two such times do not compare.
+//! busy slows down more then than what waits for its own results, so figures of two such times do not compare. Quiet
+//! is as good as it has been: a core that was shared from the beginning is not told from a slow one.
 
 use crate::stats::median;
 use std::{
