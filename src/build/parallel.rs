@@ -31,15 +31,12 @@ pub(super) fn map<T: Send, R: Send>(
     make: impl Fn(T) -> R + Send + Sync,
 ) -> Vec<R> {
     #[cfg(feature = "rayon")]
-    {
+    let items: Vec<T> = items.into_iter().collect();
+    #[cfg(feature = "rayon")]
+    if items.len() > 1 {
         use rayon::prelude::*;
-        let items: Vec<T> = items.into_iter().collect();
-        if items.len() > 1 {
-            return items.into_par_iter().map(make).collect();
-        }
-        items.into_iter().map(make).collect()
+        return items.into_par_iter().map(make).collect();
     }
-    #[cfg(not(feature = "rayon"))]
     items.into_iter().map(make).collect()
 }
 

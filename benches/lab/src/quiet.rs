@@ -73,7 +73,7 @@ impl Quiet {
     }
 }
 
-/// The median of undisturbed turns, if there are some, else of all, in seconds.
+/// The median of undisturbed turns, if there are at least [`LEAST_TURNS`], else of all, in seconds.
 ///
 /// # Panics
 /// Without turns.
@@ -112,9 +112,13 @@ mod tests {
         quiet.least = Duration::ZERO;
         let (start, mut runs) = (Instant::now(), 0);
         let turns: Vec<_> = (0..5).map(|_| quiet.time(|| runs += 1)).collect();
-        assert!(start.elapsed() >= Duration::from_millis(20));
+        let all = start.elapsed();
+        assert!(all >= Duration::from_millis(20));
         assert_eq!((runs, quiet.turns()), (5, (5, 5)));
-        assert!(turns.iter().all(|turn| !turn.quiet && turn.seconds < 0.01));
+        assert!(turns.iter().all(|turn| !turn.quiet));
+        // What was waited for is no part of them, however slow the machine is.
+        let timed: f64 = turns.iter().map(|turn| turn.seconds).sum();
+        assert!(timed + 0.02 <= all.as_secs_f64(), "{timed} of {all:?}");
     }
 
     #[test]
