@@ -3,7 +3,7 @@
 use super::{
     BinaryTree, BuildError, Monitor, Preset,
     compact::compact,
-    input::{Boxes, Input, Triangles, TrianglesInRuns},
+    input::{Boxes, Input, Triangles},
     monitor::{Monitored, Watch},
     pipeline::{self, Wants},
     refs::Refs,
@@ -131,7 +131,7 @@ impl<'m> Builder<'m> {
         &self,
         mesh: &TriangleMesh,
     ) -> Result<Bvh<N, TriangleLeaf, Owned>, BuildError> {
-        self.wide_over(&Triangles(mesh))
+        N::over_mesh(self, mesh)
     }
 
     /// The compact hierarchy over a mesh, which stays where it is and is read there: see
@@ -156,7 +156,7 @@ impl<'m> Builder<'m> {
         &self,
         mesh: &TriangleMesh,
     ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
-        self.compact_over(&TrianglesInRuns(mesh))
+        N::compact_over_mesh(self, mesh)
     }
 
     /// The compact hierarchy over a caller's primitives, asked as one of [`build_primitives`](Self::build_primitives) is.
@@ -167,7 +167,7 @@ impl<'m> Builder<'m> {
         &self,
         aabbs: &[Aabb],
     ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
-        self.compact_over(&Boxes(aabbs))
+        N::compact_over_boxes(self, aabbs)
     }
 
     /// The hierarchy over a caller's primitives, which are numbered as their boxes are.
@@ -209,7 +209,7 @@ impl<'m> Builder<'m> {
         &self,
         aabbs: &[Aabb],
     ) -> Result<Bvh<N, PrimitiveLeaf, Owned>, BuildError> {
-        self.wide_over(&Boxes(aabbs))
+        N::over_boxes(self, aabbs)
     }
 
     /// The binary tree over a mesh, before it is collapsed: one triangle a leaf.
@@ -255,7 +255,7 @@ impl<'m> Builder<'m> {
         mesh: &TriangleMesh,
         tree: &BinaryTree,
     ) -> Result<Bvh<N, TriangleLeaf, Owned>, BuildError> {
-        self.wide_from(&Triangles(mesh), tree)
+        N::from_mesh_tree(self, mesh, tree)
     }
 
     /// The hierarchy over a caller's primitives from a binary tree over them. See
@@ -268,10 +268,10 @@ impl<'m> Builder<'m> {
         aabbs: &[Aabb],
         tree: &BinaryTree,
     ) -> Result<Bvh<N, PrimitiveLeaf, Owned>, BuildError> {
-        self.wide_from(&Boxes(aabbs), tree)
+        N::from_boxes_tree(self, aabbs, tree)
     }
 
-    fn wide_over<N: WideNode, I: Input>(
+    pub(super) fn wide_over<N: WideNode, I: Input>(
         &self,
         input: &I,
     ) -> Result<Bvh<N, I::Leaf, Owned>, BuildError> {
@@ -283,7 +283,7 @@ impl<'m> Builder<'m> {
         pipeline::build(input, wants, &Watch::new(self.monitored))
     }
 
-    fn compact_over<N: WideNode, I: Input<Leaf = PrimitiveLeaf>>(
+    pub(super) fn compact_over<N: WideNode, I: Input<Leaf = PrimitiveLeaf>>(
         &self,
         input: &I,
     ) -> Result<Bvh<N, RunLeaf, Owned>, BuildError> {
@@ -293,7 +293,7 @@ impl<'m> Builder<'m> {
         }
     }
 
-    fn wide_from<N: WideNode, I: Input>(
+    pub(super) fn wide_from<N: WideNode, I: Input>(
         &self,
         input: &I,
         tree: &BinaryTree,

@@ -22,7 +22,7 @@
 // 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
 // 6. `walk`, `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
 //
-// `pipeline` has them one after the other, as a `preset` wants them. Its fast way is `fast`:
+// `pipeline` has them one after the other, as a `preset` wants them, for each node that is `buildable`. Its fast way is `fast`:
 //
 // 1. `morton`, `radix`: the primitives along a curve.
 // 2. `sections` of the curve, each by itself: `runs`, leaves of what follows each other; `ploc`, the binary tree over
@@ -38,6 +38,7 @@ mod adopt;
 mod assembly;
 mod binary;
 mod binned;
+mod buildable;
 mod builder;
 mod clip;
 mod collapse;
@@ -78,6 +79,7 @@ mod tests;
 mod walk;
 
 pub use binary::{BinaryNode, BinaryTree, TreeError};
+pub(crate) use buildable::Buildable;
 pub use builder::Builder;
 pub use error::{BuildError, RefitError, ReorderError};
 pub use monitor::Monitor;

@@ -136,6 +136,9 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
 }
 
 pub(super) mod sealed {
+    #[cfg(feature = "std")]
+    pub trait Sealed: crate::build::Buildable {}
+    #[cfg(not(feature = "std"))]
     pub trait Sealed {}
 }
 
