@@ -1,12 +1,13 @@
-//! What holds beside the contract and its committed vectors. One program: what is generic is compiled once, not for each file.
+//! The contract, its committed vectors, and what holds beside it. One program: what is generic is compiled once, not for each
+//! file.
 
-#[path = "../common/mod.rs"]
 mod common;
 
 mod accuracy;
 mod approximate;
 mod batch;
 mod bytes;
+mod contract;
 mod parts;
 mod presets;
 mod primitives;
@@ -15,4 +16,5 @@ mod refit_boxes;
 mod refit_runs;
 mod regressions;
 mod reorder;
+mod vectors;
 mod watertight;

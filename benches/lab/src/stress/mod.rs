@@ -229,6 +229,21 @@ mod tests {
         }
     }
 
+    /// The command, in the program that tests have been compiled into.
+    #[test]
+    #[ignore = "half a minute"]
+    fn a_longer_run() {
+        let args = Args {
+            rays: 200_000,
+            seed: 1,
+            family: Vec::new(),
+            case: None,
+            json: None,
+            list: false,
+        };
+        run(&args).unwrap_or_else(|error| panic!("{error}"));
+    }
+
     /// What such runs have found.
     #[test]
     fn cases_that_failed_once() {

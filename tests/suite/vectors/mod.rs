@@ -1,7 +1,7 @@
 //! Committed meshes, rays and bits of hits: every instruction set has to give these very bits, whatever machine they were
 //! found on.
 //!
-//! `cargo test --test vectors -- --ignored` fills files that are empty, and fails where one would become another: that is a
+//! `cargo test --test suite -- --ignored vectors` fills files that are empty, and fails where one would become another: that is a
 //! change of what the crate answers.
 
 mod file;
@@ -205,7 +205,7 @@ fn the_files_are_worth_their_bytes() {
 #[test]
 #[ignore = "writes the files that are empty"]
 fn write() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/vectors");
     for (name, there) in FILES {
         let bytes = generate(name).to_bytes();
         if there.is_empty() {

@@ -2,6 +2,9 @@
 //! builder. As in its examples the triangles lie in the order of the leaves; they are its type with
 //! the edges and the normal worked out beforehand.
 
+#[cfg(test)]
+mod adopted;
+
 use super::{Batch, Built, Chosen, Engine, timed};
 use glam::Vec3A;
 use obvhs::{

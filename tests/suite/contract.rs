@@ -1,8 +1,6 @@
 //! Every width and backend gives the reference's answer, bit for bit, to rays of every kind.
 
-mod common;
-
-use common::{Variants, any_float, config, coordinate, point, point_on, soup, target};
+use crate::common::{Variants, any_float, config, coordinate, point, point_on, soup, target};
 use glam::Vec3;
 use proptest::prelude::*;
 use wide_bvh::{build::Builder, geometry::Ray};
@@ -305,7 +303,7 @@ fn zero_is_positive() {
 /// Long triangles that cross one another, enough of them for the builder to cut some.
 #[test]
 fn triangles_in_pieces() {
-    let mut random = fastrand::Rng::with_seed(common::SEED);
+    let mut random = fastrand::Rng::with_seed(crate::common::SEED);
     let mut near = |centre: Vec3, size: f32| {
         (centre + size * Vec3::from([0; 3].map(|_| random.f32() - 0.5))).to_array()
     };

@@ -1,5 +1,4 @@
 //! What the contract's tests share: every variant of a hierarchy, held to the reference.
-#![allow(dead_code)]
 
 use glam::Vec3;
 use proptest::{
