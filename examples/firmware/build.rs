@@ -1,13 +1,13 @@
 //! Bakes the scene: a mesh and rays, as the crate's tests have them, the hierarchy over it, and what brute force finds.
 
-#[path = "../../tests/vectors/file.rs"]
+#[path = "../../tests/suite/vectors/file.rs"]
 mod file;
 
 use bytemuck::cast_slice;
 use std::{env, error::Error, fs, path::PathBuf};
 use wide_bvh::{build::Builder, geometry::TriangleMesh, layout::CompactBvh4, reference};
 
-const VECTORS: &str = "../../tests/vectors/knot.bin";
+const VECTORS: &str = "../../tests/suite/vectors/knot.bin";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let out = PathBuf::from(env::var("OUT_DIR")?);

@@ -19,6 +19,8 @@ pub struct Approximate<L>(PhantomData<L>);
 #[derive(Clone, Copy)]
 pub struct ApproximateRef<R>(R);
 
+impl<L: TriangleLeaves> super::leaves::sealed::Sealed for Approximate<L> {}
+
 impl<L: TriangleLeaves> Leaves for Approximate<L> {
     type Store<S: Storage> = L::Store<S>;
     type Ref<'a> = ApproximateRef<L::Ref<'a>>;

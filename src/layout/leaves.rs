@@ -1,6 +1,6 @@
 //! How a hierarchy keeps its leaves, and what the traversal needs of those that hold triangles.
 
-use super::{Borrowed, Gather, LayoutError, Leaf, Storage};
+use super::{Borrowed, Gather, LayoutError, Leaf, Storage, bytes::TRIANGLE_LEAVES};
 use crate::{
     primitive::{
         exact::{Pair, Pairs},
@@ -12,12 +12,16 @@ use core::ops::Range;
 
 /// A kind of leaves: stored one by one ([`Leaf`]), or as runs of the list of primitive numbers alone
 /// ([`RunLeaf`](super::RunLeaf), [`MeshLeaf`](super::MeshLeaf)).
-pub trait Leaves: Sized {
+pub trait Leaves: Sized + sealed::Sealed {
     /// All leaves of a hierarchy, in memory of `S`.
     type Store<S: Storage>: Clone;
     /// One of them.
     #[doc(hidden)]
     type Ref<'a>: Copy;
+
+    /// Whether they are [`TriangleLeaf`](super::TriangleLeaf)s.
+    #[doc(hidden)]
+    const ARE_TRIANGLES: bool = false;
 
     /// Whether there is a list of primitive numbers.
     #[doc(hidden)]
@@ -94,7 +98,13 @@ pub trait Leaves: Sized {
     fn primitives(leaf: Self::Ref<'_>) -> usize;
 }
 
+pub(super) mod sealed {
+    pub trait Sealed {}
+    impl<L: super::Leaf> Sealed for L {}
+}
+
 impl<L: Leaf> Leaves for L {
+    const ARE_TRIANGLES: bool = L::KIND == TRIANGLE_LEAVES;
     type Store<S: Storage> = S::Slice<L>;
     type Ref<'a> = &'a L;
 

@@ -44,6 +44,7 @@ pub use leaves::{Leaves, TriangleLeaves, Triangles};
 pub use node::WideNode;
 pub(crate) use order::number_at;
 pub use order::{ByList, Counted, InOrder, Order};
+#[cfg(feature = "std")]
 pub(crate) use run::of_place;
 pub use run::{MeshLeaf, MeshTooSmall, OrderedLeaf, OrderedMeshLeaf, RunLeaf, Runs};
 #[cfg(feature = "alloc")]

@@ -96,6 +96,8 @@ impl Numbered for TriangleMesh<'_> {
     }
 }
 
+impl<M: Part + Numbered, O: Order> super::leaves::sealed::Sealed for Runs<M, O> {}
+
 impl<M: Part + Numbered, O: Order> Leaves for Runs<M, O> {
     type Store<S: Storage> = O::Over<M>;
     type Ref<'a> = Run<'a, M, O>;

@@ -5,6 +5,10 @@ use core::{marker::PhantomData, ops::Deref};
 /// Where the parts of a hierarchy lie: in vectors of its own, or in somebody else's memory. There are no others: that a slice
 /// stays what it was when it was checked is what walks rely on.
 pub trait Storage: sealed::Sealed {
+    /// Whether it is [`Owned`].
+    #[doc(hidden)]
+    const IS_OWNED: bool = false;
+
     /// A run of `T`.
     type Slice<T: 'static + Clone>: Deref<Target = [T]> + Clone;
 }
@@ -23,6 +27,7 @@ pub struct Owned;
 
 #[cfg(feature = "alloc")]
 impl Storage for Owned {
+    const IS_OWNED: bool = true;
     type Slice<T: 'static + Clone> = alloc::vec::Vec<T>;
 }
 

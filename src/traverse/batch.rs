@@ -1,5 +1,7 @@
 //! Many rays a call.
 
+#[cfg(feature = "std")]
+use super::compiled;
 use super::{
     bundle::{self, Tightness},
     classes::{self, Patience},
@@ -67,6 +69,10 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        #[cfg(feature = "std")]
+        if Self::IS_BVH8 {
+            return compiled::closest_hits(self.as_bvh8(), rays, hits);
+        }
         self.backend().run(Batch::<N, L, S, ClosestHit> {
             bvh: self,
             rays,
@@ -76,6 +82,10 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
 
     /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 96 KiB of stack, where this crate is optimised.
     pub fn any_hits(&self, rays: &[Ray], occluded: &mut [bool]) {
+        #[cfg(feature = "std")]
+        if Self::IS_BVH8 {
+            return compiled::any_hits(self.as_bvh8(), rays, occluded);
+        }
         self.backend().run(Batch::<N, L, S, AnyHit> {
             bvh: self,
             rays,
@@ -179,10 +189,10 @@ fn paired<'a, A>(rays: &'a [Ray], answers: &'a mut [A]) -> (&'a [Ray], &'a mut [
 }
 
 /// Bundles of the rays that are alike, and waves of what lies between.
-struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
-    bvh: &'a Bvh<N, L, S>,
-    rays: &'a [Ray],
-    answers: &'a mut [Q::Answer],
+pub(super) struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
+    pub(super) bvh: &'a Bvh<N, L, S>,
+    pub(super) rays: &'a [Ray],
+    pub(super) answers: &'a mut [Q::Answer],
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'_, N, L, S, Q> {

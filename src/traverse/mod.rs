@@ -12,17 +12,25 @@
 //! A hierarchy over [primitives of your own](crate::primitive::Primitives) has `closest_hit` and `any_hit`, which are given
 //! the primitives. A compact one over a mesh is asked once it is put [`over`](crate::layout::Bvh::over) it.
 //!
-//! Stack is as measured in optimised builds; in ones that are not, a batch takes 0.9 MiB: have Cargo optimise this crate in
-//! them, too, by `opt-level = 3` under `[profile.dev.package.wide-bvh]`.
+//! Stack is as measured in optimised builds; in ones that are not, a batch takes 0.9 MiB.
+//!
+//! # Debug builds
+//!
+//! `opt-level = 3` under `[profile.dev.package.wide-bvh]` has Cargo optimise this crate whatever else it does not: builds, and of
+//! a [`Bvh8`](crate::layout::Bvh8) the four queries that come first above. All other queries are compiled with what asks
+//! them, and as that is: 15 to 45 times as slow where nothing is optimised. Put those into a crate of their own, and have that
+//! optimised likewise.
 
 // Each is written once for every node, leaf and backend. `single` is the walk of one ray; `wave` interleaves many, that
 // `feed` gives it; a `bundle` goes side by side. `batch` chooses between them, by the `classes` of the rays and by
-// the backend. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
+// the backend. `compiled` has those of what most ask, not generic. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
 
 mod batch;
 mod boxes;
 mod bundle;
 mod classes;
+#[cfg(feature = "std")]
+mod compiled;
 mod count;
 mod feed;
 mod guess;

@@ -1,5 +1,7 @@
 //! Closest hit and any hit over triangles.
 
+#[cfg(feature = "std")]
+use super::compiled;
 use super::{
     Counts,
     count::Counting,
@@ -20,6 +22,10 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// ones the one of least number.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        #[cfg(feature = "std")]
+        if Self::IS_BVH8 {
+            return compiled::closest_hit(self.as_bvh8(), ray);
+        }
         self.backend().run(Closest { bvh: self, ray })
     }
 
@@ -27,6 +33,10 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     /// finds something, and sooner.
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
+        #[cfg(feature = "std")]
+        if Self::IS_BVH8 {
+            return compiled::any_hit(self.as_bvh8(), ray);
+        }
         self.backend().run(Any { bvh: self, ray })
     }
 
@@ -126,9 +136,9 @@ impl Found {
     }
 }
 
-struct Closest<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
-    bvh: &'a Bvh<N, L, S>,
-    ray: &'a Ray,
+pub(super) struct Closest<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    pub(super) bvh: &'a Bvh<N, L, S>,
+    pub(super) ray: &'a Ray,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Closest<'_, N, L, S> {
@@ -175,9 +185,9 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for ClosestCounted<'_
     }
 }
 
-struct Any<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
-    bvh: &'a Bvh<N, L, S>,
-    ray: &'a Ray,
+pub(super) struct Any<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    pub(super) bvh: &'a Bvh<N, L, S>,
+    pub(super) ray: &'a Ray,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Any<'_, N, L, S> {

@@ -216,32 +216,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_run_of_every_family() {
+    fn every_family() {
         let families: Vec<_> = FAMILIES
             .iter()
             .filter(|f| !f.flushes || flush::AVAILABLE)
             .collect();
-        let rows = stress(&families, 1, 80_000, None).unwrap_or_else(|error| panic!("{error}"));
+        let rows = stress(&families, 1, 200_000, None).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(rows.len(), families.len());
         for row in rows {
             assert!(row.rays > 10 && row.ray_checks > row.rays, "{}", row.family);
             assert!(row.hits > 0, "{} never hits", row.family);
         }
-    }
-
-    /// The command, in the program that tests have been compiled into.
-    #[test]
-    #[ignore = "half a minute"]
-    fn a_longer_run() {
-        let args = Args {
-            rays: 200_000,
-            seed: 1,
-            family: Vec::new(),
-            case: None,
-            json: None,
-            list: false,
-        };
-        run(&args).unwrap_or_else(|error| panic!("{error}"));
     }
 
     /// What such runs have found.

@@ -1,0 +1,53 @@
+//! Queries of a [`Bvh8`], compiled with this crate.
+//!
+//! What is generic is compiled by whoever asks, as they are optimised: the debug build of a game would trace at its own speed,
+//! however this crate is optimised. Of what builds make unless told otherwise it does not.
+
+use super::{
+    batch::Batch,
+    query::{AnyHit, ClosestHit},
+    triangles::{Any, Closest},
+};
+use crate::{
+    geometry::{Hit, Ray},
+    layout::{Bvh, Bvh8, Leaves, Node8, Storage, WideNode},
+};
+use core::ptr;
+
+impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
+    /// Whether this is a [`Bvh8`].
+    pub(super) const IS_BVH8: bool = N::KIND == Node8::KIND && L::ARE_TRIANGLES && S::IS_OWNED;
+
+    /// This, which is a [`Bvh8`].
+    #[inline(always)]
+    pub(super) fn as_bvh8(&self) -> &Bvh8 {
+        assert!(Self::IS_BVH8);
+        // SAFETY: the same type, by the line above. No two kinds of nodes, of leaves or of storage have the same constant, and
+        // nobody can add others.
+        unsafe { &*ptr::from_ref(self).cast() }
+    }
+}
+
+pub(super) fn closest_hit(bvh: &Bvh8, ray: &Ray) -> Option<Hit> {
+    bvh.backend().run(Closest { bvh, ray })
+}
+
+pub(super) fn any_hit(bvh: &Bvh8, ray: &Ray) -> bool {
+    bvh.backend().run(Any { bvh, ray })
+}
+
+pub(super) fn closest_hits(bvh: &Bvh8, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    bvh.backend().run(Batch::<_, _, _, ClosestHit> {
+        bvh,
+        rays,
+        answers: hits,
+    });
+}
+
+pub(super) fn any_hits(bvh: &Bvh8, rays: &[Ray], occluded: &mut [bool]) {
+    bvh.backend().run(Batch::<_, _, _, AnyHit> {
+        bvh,
+        rays,
+        answers: occluded,
+    });
+}
