@@ -51,3 +51,29 @@ pub(super) fn any_hits(bvh: &Bvh8, rays: &[Ray], occluded: &mut [bool]) {
         answers: occluded,
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{
+        Approximate, Borrowed, CompactNode4, CompactNode8, MeshLeaf, Node4, OrderedLeaf, Owned,
+        PrimitiveLeaf, RunLeaf, TriangleLeaf,
+    };
+
+    #[test]
+    fn nothing_else_is_a_bvh8() {
+        assert_eq!([Bvh8::IS_BVH8], [true]);
+        let others = [
+            Bvh::<Node4, TriangleLeaf, Owned>::IS_BVH8,
+            Bvh::<CompactNode8, TriangleLeaf, Owned>::IS_BVH8,
+            Bvh::<CompactNode4, TriangleLeaf, Owned>::IS_BVH8,
+            Bvh::<Node8, Approximate<TriangleLeaf>, Owned>::IS_BVH8,
+            Bvh::<Node8, PrimitiveLeaf, Owned>::IS_BVH8,
+            Bvh::<Node8, RunLeaf, Owned>::IS_BVH8,
+            Bvh::<Node8, OrderedLeaf, Owned>::IS_BVH8,
+            Bvh::<Node8, MeshLeaf, Owned>::IS_BVH8,
+            Bvh::<Node8, TriangleLeaf, Borrowed>::IS_BVH8,
+        ];
+        assert_eq!(others, [false; 9]);
+    }
+}

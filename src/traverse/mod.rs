@@ -23,7 +23,8 @@
 
 // Each is written once for every node, leaf and backend. `single` is the walk of one ray; `wave` interleaves many, that
 // `feed` gives it; a `bundle` goes side by side. `batch` chooses between them, by the `classes` of the rays and by
-// the backend. `compiled` has those of what most ask, not generic. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits.
+// the backend. What a leaf's triangles answer is the same code in all of them, so the answers are the same bits. `compiled` has
+// of them what most ask, not generic any more.
 
 mod batch;
 mod boxes;
