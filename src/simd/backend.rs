@@ -22,7 +22,7 @@ enum Kind {
 }
 
 /// Something to be done with vectors, whatever the backend.
-pub trait Operation {
+pub trait Operation: Sized {
     /// What comes of it.
     type Output;
     /// Does it. To be marked `#[inline(always)]`, or the backend's instructions do not reach it.
@@ -83,35 +83,47 @@ impl Backend {
     #[inline(always)]
     pub(crate) fn run<O: Operation>(self, operation: O) -> O::Output {
         match self.0 {
-            Kind::Portable => run_portable(operation),
+            Kind::Portable => operation.on_portable(),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the token says that the processor has these instructions.
-            Kind::Avx2(avx2) => unsafe { run_avx2(operation, avx2) },
+            Kind::Avx2(avx2) => unsafe { operation.on_avx2(avx2) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Kind::Avx512(avx512) => unsafe { run_avx512(operation, avx512) },
+            Kind::Avx512(avx512) => unsafe { operation.on_avx512(avx512) },
         }
     }
 }
 
-/// A call where the others are: their callers' frames have no part of its own.
-#[cfg_attr(target_arch = "x86_64", inline(never))]
-#[cfg_attr(not(target_arch = "x86_64"), inline(always))]
-fn run_portable<O: Operation>(operation: O) -> O::Output {
-    operation.run(Portable)
+/// An operation on each backend.
+///
+/// Methods of the operation, not functions: compilers sort code by the module of what a method is of, and what they so put
+/// together is compiled by one thread. All there is of queries and builds is in here.
+trait On: Operation {
+    /// A call where the others are: their callers' frames have no part of its own.
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn on_portable(self) -> Self::Output {
+        self.run(Portable)
+    }
+
+    /// # Safety
+    /// The processor has these instructions, as the token says.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
+    unsafe fn on_avx2(self, token: Avx2) -> Self::Output {
+        self.run(token)
+    }
+
+    /// # Safety
+    /// The processor has these instructions, as the token says.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+    unsafe fn on_avx512(self, token: Avx512) -> Self::Output {
+        self.run(token)
+    }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
-fn run_avx2<O: Operation>(operation: O, token: Avx2) -> O::Output {
-    operation.run(token)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
-fn run_avx512<O: Operation>(operation: O, token: Avx512) -> O::Output {
-    operation.run(token)
-}
+impl<O: Operation> On for O {}
 
 impl Default for Backend {
     fn default() -> Self {
