@@ -22,7 +22,8 @@
 // 5. `group`: leaves are joined; then 3 and 4 once more, over leaves.
 // 6. `walk`, `emit`: the parts, in the layout's order; `rebalance`, should they need more than a walk's stack.
 //
-// `pipeline` has them one after the other, as a `preset` wants them, for each node that is `buildable`. Its fast way is `fast`:
+// `pipeline` has them one after the other, as a `preset` wants them, for each node that is `buildable`. Its fast way is
+// `fast`:
 //
 // 1. `morton`, `radix`: the primitives along a curve.
 // 2. `sections` of the curve, each by itself: `runs`, leaves of what follows each other; `ploc`, the binary tree over

@@ -73,11 +73,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         if Self::IS_BVH8 {
             return compiled::closest_hits(self.as_bvh8(), rays, hits);
         }
-        self.backend().run(Batch::<N, L, S, ClosestHit> {
-            bvh: self,
-            rays,
-            answers: hits,
-        });
+        trace::<N, L, S, ClosestHit>(self, rays, hits);
     }
 
     /// Whether [anything is in the way](Self::any_hit) of each ray. Takes up to 96 KiB of stack, where this crate is optimised.
@@ -86,11 +82,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         if Self::IS_BVH8 {
             return compiled::any_hits(self.as_bvh8(), rays, occluded);
         }
-        self.backend().run(Batch::<N, L, S, AnyHit> {
-            bvh: self,
-            rays,
-            answers: occluded,
-        });
+        trace::<N, L, S, AnyHit>(self, rays, occluded);
     }
 
     /// As [`closest_hits`](Self::closest_hits), in the caller's memory and with hardly more stack than one ray
@@ -188,11 +180,22 @@ fn paired<'a, A>(rays: &'a [Ray], answers: &'a mut [A]) -> (&'a [Ray], &'a mut [
     (&rays[..count], &mut answers[..count])
 }
 
+/// Answers a batch.
+#[inline(always)]
+pub(super) fn trace<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query>(
+    bvh: &Bvh<N, L, S>,
+    rays: &[Ray],
+    answers: &mut [Q::Answer],
+) {
+    let batch = Batch::<N, L, S, Q> { bvh, rays, answers };
+    bvh.backend().run(batch);
+}
+
 /// Bundles of the rays that are alike, and waves of what lies between.
-pub(super) struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
-    pub(super) bvh: &'a Bvh<N, L, S>,
-    pub(super) rays: &'a [Ray],
-    pub(super) answers: &'a mut [Q::Answer],
+struct Batch<'a, N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> {
+    bvh: &'a Bvh<N, L, S>,
+    rays: &'a [Ray],
+    answers: &'a mut [Q::Answer],
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage, Q: Query> Operation for Batch<'_, N, L, S, Q> {

@@ -4,9 +4,9 @@
 //! however this crate is optimised. Of what builds make unless told otherwise it does not.
 
 use super::{
-    batch::Batch,
+    batch,
     query::{AnyHit, ClosestHit},
-    triangles::{Any, Closest},
+    triangles,
 };
 use crate::{
     geometry::{Hit, Ray},
@@ -29,27 +29,19 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
 }
 
 pub(super) fn closest_hit(bvh: &Bvh8, ray: &Ray) -> Option<Hit> {
-    bvh.backend().run(Closest { bvh, ray })
+    triangles::closest_hit(bvh, ray)
 }
 
 pub(super) fn any_hit(bvh: &Bvh8, ray: &Ray) -> bool {
-    bvh.backend().run(Any { bvh, ray })
+    triangles::any_hit(bvh, ray)
 }
 
 pub(super) fn closest_hits(bvh: &Bvh8, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    bvh.backend().run(Batch::<_, _, _, ClosestHit> {
-        bvh,
-        rays,
-        answers: hits,
-    });
+    batch::trace::<_, _, _, ClosestHit>(bvh, rays, hits);
 }
 
 pub(super) fn any_hits(bvh: &Bvh8, rays: &[Ray], occluded: &mut [bool]) {
-    bvh.backend().run(Batch::<_, _, _, AnyHit> {
-        bvh,
-        rays,
-        answers: occluded,
-    });
+    batch::trace::<_, _, _, AnyHit>(bvh, rays, occluded);
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         if Self::IS_BVH8 {
             return compiled::closest_hit(self.as_bvh8(), ray);
         }
-        self.backend().run(Closest { bvh: self, ray })
+        closest_hit(self, ray)
     }
 
     /// Whether the ray hits anything within its range: just when [`closest_hit`](Self::closest_hit)
@@ -37,7 +37,7 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
         if Self::IS_BVH8 {
             return compiled::any_hit(self.as_bvh8(), ray);
         }
-        self.backend().run(Any { bvh: self, ray })
+        any_hit(self, ray)
     }
 
     /// [`closest_hit`](Self::closest_hit), and what it cost.
@@ -49,6 +49,22 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Bvh<N, L, S> {
     pub fn any_hit_counted(&self, ray: &Ray) -> (bool, Counts) {
         self.backend().run(AnyCounted { bvh: self, ray })
     }
+}
+
+#[inline(always)]
+pub(super) fn closest_hit<N: WideNode, L: TriangleLeaves, S: Storage>(
+    bvh: &Bvh<N, L, S>,
+    ray: &Ray,
+) -> Option<Hit> {
+    bvh.backend().run(Closest { bvh, ray })
+}
+
+#[inline(always)]
+pub(super) fn any_hit<N: WideNode, L: TriangleLeaves, S: Storage>(
+    bvh: &Bvh<N, L, S>,
+    ray: &Ray,
+) -> bool {
+    bvh.backend().run(Any { bvh, ray })
 }
 
 /// The best hit so far.
@@ -136,9 +152,9 @@ impl Found {
     }
 }
 
-pub(super) struct Closest<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
-    pub(super) bvh: &'a Bvh<N, L, S>,
-    pub(super) ray: &'a Ray,
+struct Closest<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
+    ray: &'a Ray,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Closest<'_, N, L, S> {
@@ -185,9 +201,9 @@ impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for ClosestCounted<'_
     }
 }
 
-pub(super) struct Any<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
-    pub(super) bvh: &'a Bvh<N, L, S>,
-    pub(super) ray: &'a Ray,
+struct Any<'a, N: WideNode, L: TriangleLeaves, S: Storage> {
+    bvh: &'a Bvh<N, L, S>,
+    ray: &'a Ray,
 }
 
 impl<N: WideNode, L: TriangleLeaves, S: Storage> Operation for Any<'_, N, L, S> {

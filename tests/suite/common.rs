@@ -1,5 +1,6 @@
 //! What the contract's tests share: every variant of a hierarchy, held to the reference.
 
+pub use crate::vectors::bits;
 use glam::Vec3;
 use proptest::{
     prelude::*,
@@ -165,11 +166,6 @@ fn add<N: WideNode, L: TriangleLeaves, S: Storage>(
 {
     let query = move |ray: &Ray| (bvh.closest_hit(ray), bvh.any_hit(ray));
     queries.push((name, Box::new(query)));
-}
-
-/// A hit as bits, for -0 to differ from 0.
-pub fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
-    hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive])
 }
 
 /// Any float at all, NaN, infinities, zeros and denormals as likely as the others together.

@@ -61,9 +61,13 @@ impl Sample {
     }
 }
 
+/// A hit as bits, for -0 to differ from 0.
+pub fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
+    hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive])
+}
+
 fn same_bits(a: Option<Hit>, b: Option<Hit>) -> bool {
-    let bits = |hit: Hit| [hit.t, hit.u, hit.v].map(f32::to_bits);
-    a.map(|hit| (bits(hit), hit.primitive)) == b.map(|hit| (bits(hit), hit.primitive))
+    bits(a) == bits(b)
 }
 
 fn alike(answer: Option<Hit>, truth: Option<Hit>) -> bool {

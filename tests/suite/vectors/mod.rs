@@ -1,13 +1,14 @@
 //! Committed meshes, rays and bits of hits: every instruction set has to give these very bits, whatever machine they were
 //! found on.
 //!
-//! `cargo test --test suite -- --ignored vectors` fills files that are empty, and fails where one would become another: that is a
-//! change of what the crate answers.
+//! `cargo test --test suite -- --ignored vectors` fills files that are empty, and fails where one would become another: that
+//! is a change of what the crate answers.
 
 mod file;
 mod generate;
 
-use file::{Vectors, bits};
+use file::Vectors;
+pub use file::bits;
 use generate::generate;
 use std::{fmt::Debug, path::Path};
 use wide_bvh::{

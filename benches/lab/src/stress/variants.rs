@@ -4,6 +4,7 @@
 //! [`ask`] by kinds of call. What is opened from bytes has to answer as what was written.
 
 use super::flush::flushed;
+use crate::reference::bits;
 use fastrand::Rng;
 use wide_bvh::{
     build::{BinaryTree, BuildError, Builder, Preset},
@@ -478,18 +479,6 @@ fn ask_at_once<N: WideNode, L: TriangleLeaves, S: Storage>(
         compare(call, 8 * packet, &hits, &any)?;
     }
     Ok(checked)
-}
-
-/// As bits, for -0 to differ from 0.
-fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
-    hit.map(|hit| {
-        [
-            hit.t.to_bits(),
-            hit.u.to_bits(),
-            hit.v.to_bits(),
-            hit.primitive,
-        ]
-    })
 }
 
 /// A hit for people, with its bits.

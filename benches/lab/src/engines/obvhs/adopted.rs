@@ -1,6 +1,7 @@
 //! A tree from another crate's builder, converted into [`BinaryTree`]: what it traces is what brute
 //! force finds, bit for bit.
 
+use crate::reference::bits;
 use fastrand::Rng;
 use glam::Vec3;
 use obvhs::{
@@ -11,7 +12,7 @@ use obvhs::{
 use std::time::Duration;
 use wide_bvh::{
     build::{BinaryNode, BinaryTree, Builder},
-    geometry::{Aabb, Hit, Ray, TriangleMesh},
+    geometry::{Aabb, Ray, TriangleMesh},
     reference,
 };
 use wide_bvh_scenes::{Mesh, shapes::soup};
@@ -62,17 +63,6 @@ fn rays(mesh: &Mesh, count: usize) -> Vec<Ray> {
             Ray::new(from, to - from)
         })
         .collect()
-}
-
-fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
-    hit.map(|hit| {
-        [
-            hit.t.to_bits(),
-            hit.u.to_bits(),
-            hit.v.to_bits(),
-            hit.primitive,
-        ]
-    })
 }
 
 #[test]
