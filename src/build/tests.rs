@@ -622,8 +622,17 @@ fn check_cancel<T>(builder: Builder, build: impl Fn(Builder) -> Result<T, BuildE
     assert!(told[0] >= 0.0 && told[told.len() - 1] == 1.0, "{told:?}");
     for stop_at in 0..told.len() {
         let (built, told) = watched(stop_at);
-        assert_eq!(built.err(), Some(BuildError::Cancelled), "{stop_at}");
-        // With threads, another may be about to tell.
+        // Threads that would tell at once tell once, so one build may be over before it is told as often as another.
+        let stopped = told.len() > stop_at;
+        assert!(
+            stopped || stop_at > 0 && cfg!(feature = "rayon"),
+            "{stop_at}"
+        );
+        assert_eq!(
+            built.err(),
+            stopped.then_some(BuildError::Cancelled),
+            "{stop_at}"
+        );
         assert!(told.len() <= stop_at + 1);
     }
 }
