@@ -51,9 +51,15 @@ pub(crate) fn ask<N: WideNode>(
                 any,
             });
         };
+        bvh.set_large(false);
         add("one by one", singles(&bvh, rays));
         add("counted", counted(&bvh, rays));
         add("a batch", batch(&bvh, rays));
+        bvh.set_large(true);
+        add("one by one, as if large", singles(&bvh, rays));
+        add("counted, as if large", counted(&bvh, rays));
+        add("a batch, as if large", batch(&bvh, rays));
+        bvh.set_large(false);
         add("one lane", waves::<N, _, 1>(&bvh, rays));
         add("13 lanes", waves::<N, _, 13>(&bvh, rays));
         add("64 lanes", waves::<N, _, 64>(&bvh, rays));
@@ -168,7 +174,11 @@ pub(crate) fn ask_mesh<'a, N: WideNode, O: Order>(
     let mut answers = Vec::new();
     for backend in Backend::available() {
         bvh.set_backend(backend);
+        bvh.set_large(true);
+        let ahead = singles(&bvh, rays);
+        bvh.set_large(false);
         let asked = [
+            ("one by one, as if large", ahead),
             ("one by one", singles(&bvh, rays)),
             ("counted", counted(&bvh, rays)),
             ("a batch", batch(&bvh, rays)),
@@ -193,15 +203,18 @@ pub(crate) fn ask_primitives<N: WideNode>(
     let mut answers = Vec::new();
     for backend in Backend::available() {
         bvh.set_backend(backend);
-        let closest = |ray: &Ray| Primitive(bvh.closest_hit(primitives, ray)).into();
-        answers.push(Answers {
-            how: format!("primitives, {} wide, {}", N::WIDTH, backend.name()),
-            closest: rays.iter().map(closest).collect(),
-            any: rays
-                .iter()
-                .map(|ray| bvh.any_hit(primitives, ray))
-                .collect(),
-        });
+        for (is_large, size) in [(false, ""), (true, ", as if large")] {
+            bvh.set_large(is_large);
+            let closest = |ray: &Ray| Primitive(bvh.closest_hit(primitives, ray)).into();
+            answers.push(Answers {
+                how: format!("primitives, {} wide, {}{size}", N::WIDTH, backend.name()),
+                closest: rays.iter().map(closest).collect(),
+                any: rays
+                    .iter()
+                    .map(|ray| bvh.any_hit(primitives, ray))
+                    .collect(),
+            });
+        }
     }
     answers
 }

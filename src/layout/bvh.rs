@@ -147,12 +147,6 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         &self.leaves
     }
 
-    /// Whether it is more than the caches are likely to hold.
-    #[inline(always)]
-    pub(crate) fn is_large(&self) -> bool {
-        self.large != 0
-    }
-
     /// How many primitives all leaves have together: one that is in several is counted as often.
     #[inline(always)]
     pub fn primitive_count(&self) -> usize {
@@ -241,6 +235,18 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// Has queries use other instructions than the best. The answers are the same.
     pub fn set_backend(&mut self, backend: Backend) {
         self.backend = backend;
+    }
+
+    /// Whether queries take it that caches do not hold the hierarchy, as they do if it is over more than 2^18 primitives.
+    #[inline(always)]
+    pub fn is_large(&self) -> bool {
+        self.large != 0
+    }
+
+    /// Has queries take it that caches do not hold the hierarchy, or that they do: worth a try where a program uses the caches
+    /// for much else. The answers are the same.
+    pub fn set_large(&mut self, is_large: bool) {
+        self.large = u32::from(is_large).wrapping_neg();
     }
 
     /// Notes that the builder left out this many primitives.

@@ -71,6 +71,8 @@ impl Link {
     /// 16 bytes.
     pub const UNIT: usize = 1 << Self::SHIFT;
     const SHIFT: u32 = 4;
+    /// To nothing.
+    pub(crate) const EMPTY: Self = Self(Child::EMPTY.0);
     /// How many places 31 bits tell apart, from each other and from no child.
     pub(crate) const PLACES: usize = (1 << 31) - 2;
 

@@ -37,6 +37,7 @@ impl<const AVX512: bool> Simd for X86<AVX512> {
     type F32x4 = F32x4<AVX512>;
     type F32x8 = F32x8<AVX512>;
 
+    const FETCHES: bool = true;
     const INTERLEAVES: bool = true;
 
     #[inline(always)]

@@ -21,6 +21,9 @@ pub trait Simd: Copy {
     /// Whether triangles are tested one by one, since the target has no vectors: faster there, and less code.
     const ONE_BY_ONE: bool = false;
 
+    /// Whether [`prefetch_line`](Self::prefetch_line) does anything.
+    const FETCHES: bool = false;
+
     /// Whether eight floats are two vectors of four: then triangles are tested four at a time, for most leaves have no more.
     const IN_FOURS: bool = false;
 

@@ -3,12 +3,12 @@
 
 use super::{
     boxes::OneByOne,
-    single::{Visitor, walk_boxes},
+    single::{Visitor, stack, walk_boxes},
     triangles::Found,
 };
 use crate::{
     geometry::{Hit, Ray},
-    layout::{Bvh, Child, Storage, TriangleLeaves, Triangles, WideNode},
+    layout::{Bvh, Child, STACK, Storage, TriangleLeaves, Triangles, WideNode},
     primitive::triangle::RayShear,
     simd::Portable,
     slab::PreparedRay,
@@ -37,7 +37,8 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
         found: None,
         any,
     };
-    walk_boxes(Portable, bvh, &mut boxes, prepared.ray.t_max, &mut finder);
+    let (t_max, mut stack) = (prepared.ray.t_max, stack::<STACK>());
+    walk_boxes(Portable, bvh, &mut boxes, t_max, &mut finder, &mut stack);
     let found = finder.found?;
     Some(found.hit(prepared.unscaled(found.t, ray), bvh.primitives()))
 }

@@ -9,7 +9,11 @@ use crate::{
     simd::Simd,
     slab::{NarrowRay, reach_of},
 };
-use core::{mem::MaybeUninit, ops::ControlFlow, ptr};
+use core::{
+    mem::{self, MaybeUninit},
+    ops::ControlFlow,
+    ptr,
+};
 
 /// What is done on the way.
 pub(crate) trait Visitor<L: Leaves> {
@@ -29,7 +33,7 @@ pub(crate) trait Visitor<L: Leaves> {
 /// of the child, so that entries compare as their `t` do. Where boxes are tested one by one it may be negative: those come
 /// first, though not in order among themselves, which costs time and nothing else.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Entry(i64);
+pub(super) struct Entry(i64);
 
 impl Entry {
     #[inline(always)]
@@ -48,8 +52,24 @@ impl Entry {
     }
 }
 
-/// The children left behind: those below `len` were written, the next one last.
-type Stack = [MaybeUninit<Entry>; STACK];
+/// The children left behind: those below a length were written, the next one last. Nothing is cleared, and the length is
+/// apart, to stay in a register.
+///
+/// With more `ROOM` than [`STACK`] a walk looks ahead: see [`walk_boxes`].
+pub(super) type Stack<const ROOM: usize> = [MaybeUninit<Entry>; ROOM];
+
+/// An empty [`Stack`].
+pub(super) const fn stack<const ROOM: usize>() -> Stack<ROOM> {
+    [MaybeUninit::uninit(); ROOM]
+}
+
+/// A walk does not look ahead where more children than this are left behind.
+const AHEAD: usize = 64;
+/// The most children of a node.
+const WIDEST: usize = 8;
+/// Room for what a walk leaves behind that looks ahead: what was there when it last did, and what a walk leaves behind that does
+/// not.
+const ROOM_AHEAD: usize = AHEAD + WIDEST + STACK;
 
 /// Takes `visitor` to every leaf whose box the ray passes within its range, which ends at `t_max` and shrinks on the way.
 #[inline(always)]
@@ -64,10 +84,21 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
         return;
     }
     let mut boxes = AtOnce::new(token, ray);
-    walk_boxes(token, bvh, &mut boxes, t_max, visitor);
+    if T::FETCHES && bvh.is_large() {
+        let mut stack = stack::<ROOM_AHEAD>();
+        walk_boxes(token, bvh, &mut boxes, t_max, visitor, &mut stack);
+    } else {
+        let mut stack = stack::<STACK>();
+        walk_boxes(token, bvh, &mut boxes, t_max, visitor, &mut stack);
+    }
 }
 
 /// [`walk`], however boxes are tested. `bvh` is not empty.
+///
+/// If there is room, it looks ahead: where caches do not hold the hierarchy, what is next is not there yet when it is known. While
+/// it comes, the node that was left behind last is walked, which has been fetched since: all of its children are left behind in its
+/// place, and fetched. That is in vain if what is next has a nearer hit, which is seldom: of dragons' bounce rays one node of
+/// forty is more than a walk in order meets.
 #[inline(always)]
 pub(super) fn walk_boxes<
     T: Simd,
@@ -76,21 +107,25 @@ pub(super) fn walk_boxes<
     S: Storage,
     B: Boxes<N>,
     V: Visitor<L>,
+    const ROOM: usize,
 >(
     token: T,
     bvh: &Bvh<N, L, S>,
     boxes: &mut B,
     t_max: f32,
     visitor: &mut V,
+    stack: &mut Stack<ROOM>,
 ) {
+    const { assert!(N::WIDTH <= WIDEST) };
+    let looks_ahead = const { ROOM >= ROOM_AHEAD };
     let margin = boxes.margin();
     let mut t_max = reach_of(t_max, margin);
     // Where any order will do, what is guessed is mostly right, and what caches hold is there in time.
-    let fetches = V::NEAREST_FIRST || bvh.is_large();
-    // Apart, so that the length stays in a register and nothing is cleared.
-    let mut stack: Stack = [MaybeUninit::uninit(); STACK];
+    let fetches = V::NEAREST_FIRST || looks_ahead;
     let mut len = 0;
     let mut current = Link::new::<N>(bvh.root());
+    // What is next, while another node is walked in its place; a leaf until it is tested. Else empty.
+    let mut waiting = Link::EMPTY;
     loop {
         while !current.is_leaf() {
             visitor.node();
@@ -103,7 +138,11 @@ pub(super) fn walk_boxes<
             }
             let (mask, near) = boxes.test(node, t_max);
             if mask == 0 {
-                match pop::<L, V>(&stack, &mut len, t_max) {
+                if looks_ahead && waiting != Link::EMPTY {
+                    current = resume(&mut waiting);
+                    continue;
+                }
+                match pop::<L, V, ROOM>(stack, &mut len, t_max) {
                     Some(link) => current = link,
                     None => return,
                 }
@@ -118,7 +157,16 @@ pub(super) fn walk_boxes<
             };
             // SAFETY: `mask` has bits for the node's lanes alone.
             current = unsafe { node.link(first) };
-            if others == 0 {
+            let is_ahead = looks_ahead && waiting != Link::EMPTY;
+            if others == 0 && !is_ahead {
+                // A leaf is looked after below. With several children the last one left behind has not been fetched, either.
+                if looks_ahead
+                    && !current.is_leaf()
+                    && let Some(ahead) = pop_node::<L, V, ROOM>(stack, &mut len, t_max)
+                {
+                    bvh.prefetch(token, current);
+                    waiting = mem::replace(&mut current, ahead);
+                }
                 continue;
             }
             let near = B::nears(near);
@@ -133,7 +181,7 @@ pub(super) fn walk_boxes<
             };
             let mut nearest = entry(first);
             let base = len;
-            loop {
+            while others != 0 {
                 let other = entry(others.trailing_zeros() as usize);
                 others &= others - 1;
                 let farther = if V::NEAREST_FIRST {
@@ -146,21 +194,36 @@ pub(super) fn walk_boxes<
                 if fetches {
                     bvh.prefetch(token, farther.link());
                 }
-                // SAFETY: the layout's check saw that a walk never leaves more than `STACK`
-                // children behind.
+                // SAFETY: the layout's check saw that a walk never leaves `STACK` children behind. If it looks ahead, they
+                // lie on those that were there when it last did, `AHEAD + WIDEST` at most.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
                 len += 1;
-                if others == 0 {
-                    break;
-                }
             }
             if V::NEAREST_FIRST {
                 // SAFETY: these were just written.
                 unsafe { sort(stack.get_unchecked_mut(base..len)) };
             }
             current = nearest.link();
+            if is_ahead {
+                bvh.prefetch(token, current);
+                // SAFETY: as above: `pop_node` took the node from `AHEAD` at most.
+                unsafe { stack.get_unchecked_mut(len).write(nearest) };
+                len += 1;
+                current = resume(&mut waiting);
+            }
         }
 
+        if looks_ahead {
+            if waiting == Link::EMPTY
+                && let Some(ahead) = pop_node::<L, V, ROOM>(stack, &mut len, t_max)
+            {
+                // SAFETY: the layout's check saw that all leaves led to are there.
+                unsafe { bvh.fetch_next(token, current.leaf()) };
+                waiting = mem::replace(&mut current, ahead);
+                continue;
+            }
+            waiting = Link::EMPTY;
+        }
         // SAFETY: the layout's check saw that all leaves led to are there.
         let leaf = unsafe { bvh.leaf(current.leaf()) };
         match visitor.leaf(leaf) {
@@ -168,7 +231,7 @@ pub(super) fn walk_boxes<
             ControlFlow::Continue(t) => t_max = reach_of(t, margin),
         }
         boxes.renew();
-        match pop::<L, V>(&stack, &mut len, t_max) {
+        match pop::<L, V, ROOM>(stack, &mut len, t_max) {
             Some(link) => current = link,
             None => return,
         }
@@ -177,7 +240,11 @@ pub(super) fn walk_boxes<
 
 /// The last child left behind that is still near enough: all are where no `t` was kept, for their range never shrinks.
 #[inline(always)]
-fn pop<L: Leaves, V: Visitor<L>>(stack: &Stack, len: &mut usize, t_max: f32) -> Option<Link> {
+fn pop<L: Leaves, V: Visitor<L>, const ROOM: usize>(
+    stack: &Stack<ROOM>,
+    len: &mut usize,
+    t_max: f32,
+) -> Option<Link> {
     while *len > 0 {
         *len -= 1;
         // SAFETY: those below the length were written.
@@ -187,6 +254,36 @@ fn pop<L: Leaves, V: Visitor<L>>(stack: &Stack, len: &mut usize, t_max: f32) -> 
         }
     }
     None
+}
+
+/// The last child left behind, if that is a node, near enough, and not one of more than [`AHEAD`].
+#[inline(always)]
+fn pop_node<L: Leaves, V: Visitor<L>, const ROOM: usize>(
+    stack: &Stack<ROOM>,
+    len: &mut usize,
+    t_max: f32,
+) -> Option<Link> {
+    let last = len.wrapping_sub(1);
+    if last >= AHEAD {
+        return None;
+    }
+    // SAFETY: those below the length were written.
+    let entry = unsafe { stack.get_unchecked(last).assume_init() };
+    if entry.link().is_leaf() || V::NEAREST_FIRST && entry.near() > t_max {
+        return None;
+    }
+    *len = last;
+    Some(entry.link())
+}
+
+/// What waits. Of a leaf it is kept in mind that it has waited.
+#[inline(always)]
+fn resume(waiting: &mut Link) -> Link {
+    let link = *waiting;
+    if !link.is_leaf() {
+        *waiting = Link::EMPTY;
+    }
+    link
 }
 
 /// Sorts a few entries, the nearest last.

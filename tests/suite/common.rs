@@ -150,10 +150,13 @@ fn add_backends<N: WideNode + Sync, L: TriangleLeaves, S: Storage>(
     Bvh<N, L, S>: Clone + Sync + 'static,
 {
     for backend in Backend::available() {
-        let mut bvh = bvh.clone();
-        bvh.set_backend(backend);
-        let name = format!("{kind}, {}-wide, {}", N::WIDTH, backend.name());
-        add(queries, name, bvh);
+        for (is_large, size) in [(false, ""), (true, ", as if large")] {
+            let mut bvh = bvh.clone();
+            bvh.set_backend(backend);
+            bvh.set_large(is_large);
+            let name = format!("{kind}, {}-wide, {}{size}", N::WIDTH, backend.name());
+            add(queries, name, bvh);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ mod approximate;
 mod batch;
 mod bytes;
 mod contract;
+mod deep;
 mod parts;
 mod presets;
 mod primitives;

@@ -68,7 +68,10 @@ trait Ask {
     ) {
         for backend in Backend::available() {
             bvh.set_backend(backend);
-            self.ask(&bvh, vectors);
+            for is_large in [false, true] {
+                bvh.set_large(is_large);
+                self.ask(&bvh, vectors);
+            }
         }
     }
 }

@@ -48,6 +48,8 @@ pub fn opener(header: &Header) -> Option<Open> {
 fn leaves<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened + '_>, BytesError> {
     let mut bvh = Bvh::<N, TriangleLeaf, Borrowed>::from_bytes(bytes)?;
     bvh.set_backend(backend);
+    // What looks ahead relies on the most.
+    bvh.set_large(true);
     Ok(Box::new(bvh))
 }
 
@@ -57,5 +59,7 @@ fn runs<N: WideNode, O: Order + 'static>(
 ) -> Result<Box<dyn Opened + '_>, BytesError> {
     let mut bvh = Bvh::<N, Runs<TriangleMesh, O>, Borrowed>::from_bytes(bytes)?;
     bvh.set_backend(backend);
+    // What looks ahead relies on the most.
+    bvh.set_large(true);
     Ok(Box::new(bvh))
 }

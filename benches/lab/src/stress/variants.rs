@@ -172,6 +172,8 @@ fn check_width<N: WideNode>(
             continue;
         }
         let first = known.is_empty();
+        // All but the first as if caches did not hold them.
+        bvh.set_large(!first);
         for (place, backend) in backends(first, rays).enumerate() {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
@@ -229,6 +231,7 @@ fn check_compact<N: WideNode>(
         }
         let first = known.is_empty();
         let mut bvh = tree.over(mesh).map_err(|error| no_build(&name, error))?;
+        bvh.set_large(!first);
         for backend in backends(first, rays) {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
@@ -297,7 +300,8 @@ fn check_ordered<N: WideNode>(
     let (tree, new) = tree.reorder(mesh).map_err(|error| no_build(&name, error))?;
     let mesh = TriangleMesh::new(&new.positions, &new.indices);
     let mesh = mesh.map_err(|error| no_build(&name, error))?;
-    let bvh = tree.over(&mesh).map_err(|error| no_build(&name, error))?;
+    let mut bvh = tree.over(&mesh).map_err(|error| no_build(&name, error))?;
+    bvh.set_large(true);
     flushed_if(flush, || {
         let closest = |ray| reference::closest_hit(&mesh, ray);
         let expected: Vec<_> = rays.iter().map(closest).collect();
