@@ -51,15 +51,15 @@ pub(crate) fn ask<N: WideNode>(
                 any,
             });
         };
-        bvh.set_large(false);
+        bvh.set_looks_ahead(false);
         add("one by one", singles(&bvh, rays));
         add("counted", counted(&bvh, rays));
         add("a batch", batch(&bvh, rays));
-        bvh.set_large(true);
-        add("one by one, as if large", singles(&bvh, rays));
-        add("counted, as if large", counted(&bvh, rays));
-        add("a batch, as if large", batch(&bvh, rays));
-        bvh.set_large(false);
+        bvh.set_looks_ahead(true);
+        add("one by one, looking ahead", singles(&bvh, rays));
+        add("counted, looking ahead", counted(&bvh, rays));
+        add("a batch, looking ahead", batch(&bvh, rays));
+        bvh.set_looks_ahead(false);
         add("one lane", waves::<N, _, 1>(&bvh, rays));
         add("13 lanes", waves::<N, _, 13>(&bvh, rays));
         add("64 lanes", waves::<N, _, 64>(&bvh, rays));
@@ -174,11 +174,11 @@ pub(crate) fn ask_mesh<'a, N: WideNode, O: Order>(
     let mut answers = Vec::new();
     for backend in Backend::available() {
         bvh.set_backend(backend);
-        bvh.set_large(true);
+        bvh.set_looks_ahead(true);
         let ahead = singles(&bvh, rays);
-        bvh.set_large(false);
+        bvh.set_looks_ahead(false);
         let asked = [
-            ("one by one, as if large", ahead),
+            ("one by one, looking ahead", ahead),
             ("one by one", singles(&bvh, rays)),
             ("counted", counted(&bvh, rays)),
             ("a batch", batch(&bvh, rays)),
@@ -203,11 +203,11 @@ pub(crate) fn ask_primitives<N: WideNode>(
     let mut answers = Vec::new();
     for backend in Backend::available() {
         bvh.set_backend(backend);
-        for (is_large, size) in [(false, ""), (true, ", as if large")] {
-            bvh.set_large(is_large);
+        for (looks_ahead, how) in [(false, ""), (true, ", looking ahead")] {
+            bvh.set_looks_ahead(looks_ahead);
             let closest = |ray: &Ray| Primitive(bvh.closest_hit(primitives, ray)).into();
             answers.push(Answers {
-                how: format!("primitives, {} wide, {}{size}", N::WIDTH, backend.name()),
+                how: format!("primitives, {} wide, {}{how}", N::WIDTH, backend.name()),
                 closest: rays.iter().map(closest).collect(),
                 any: rays
                     .iter()

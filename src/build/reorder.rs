@@ -3,7 +3,7 @@
 use super::{ReorderError, pages};
 use crate::{
     geometry::TriangleMesh,
-    layout::{Bvh, OrderedLeaf, Owned, RunLeaf, WideNode},
+    layout::{Bvh, ChildKind, OrderedLeaf, Owned, RunLeaf, VERTICES, WideNode, of_place},
 };
 use std::{vec, vec::Vec};
 
@@ -73,9 +73,36 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
             vertices: vertices.all,
             triangles,
         };
-        let nodes = pages::collected(self.nodes().iter().copied());
+        let mut used = Vec::new();
+        let told = self.nodes().iter().map(|node| {
+            used.clear();
+            for lane in 0..N::WIDTH {
+                if let ChildKind::Leaf(place) = node.child(lane).kind() {
+                    used.extend(reordered.indices[of_place(place)].as_flattened());
+                }
+            }
+            node.with_first_vertex(first_of_most(&mut used))
+        });
+        let nodes = pages::collected(told);
         Ok((self.in_order(nodes), reordered))
     }
+}
+
+/// Of these numbers the one from which on most of them are among the next [`VERTICES`]; 0 of none.
+fn first_of_most(numbers: &mut [u32]) -> u32 {
+    numbers.sort_unstable();
+    let (mut most, mut first, mut end) = (0, 0, 0);
+    for (start, &number) in numbers.iter().enumerate() {
+        let among = |other: &u32| other - number < VERTICES as u32;
+        end += numbers[end..]
+            .iter()
+            .take_while(|other| among(other))
+            .count();
+        if end - start > most {
+            (most, first) = (end - start, number);
+        }
+    }
+    first
 }
 
 /// Numbers in a new order.
@@ -101,5 +128,66 @@ impl Order {
             }
         }
         order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        build::Builder,
+        layout::{CompactNode4, CompactNode8},
+    };
+    use fastrand::Rng;
+
+    #[test]
+    fn most_are_among_the_next() {
+        assert_eq!(first_of_most(&mut []), 0);
+        assert_eq!(first_of_most(&mut [7]), 7);
+        assert_eq!(first_of_most(&mut [3, 56, 41, 40, 41]), 40);
+        assert_eq!(
+            first_of_most(&mut [u32::MAX, 1, u32::MAX - 15]),
+            u32::MAX - 15
+        );
+    }
+
+    /// Nodes of leaves alone say where vertices are, and say it again when they have moved.
+    fn check<N: WideNode>() {
+        let mut rng = Rng::with_seed(17);
+        let corner = |_| [rng.f32(), rng.f32(), rng.f32()];
+        let positions: Vec<_> = (0..3000).map(corner).collect();
+        let indices: Vec<_> = (0..998)
+            .map(|first| [first, first + 1, first + 2])
+            .collect();
+        let mesh = TriangleMesh::new(&positions, &indices).unwrap();
+        let built = Builder::new().splits(0.0).build_compact::<N>(&mesh);
+        let (mut tree, mesh) = built.unwrap().reorder(&mesh).unwrap();
+        let said = |node: &N| node.first_vertex();
+        let before: Vec<_> = tree.nodes().iter().map(said).collect();
+        for (node, &said) in tree.nodes().iter().zip(&before) {
+            let children = (0..N::WIDTH).map(|lane| node.child(lane).kind());
+            let read = |child| match child {
+                ChildKind::Leaf(place) => mesh.indices[of_place(place)].as_flattened(),
+                _ => &[],
+            };
+            let leaves_alone = !children
+                .clone()
+                .any(|child| matches!(child, ChildKind::Node(_)));
+            let mut read = children.flat_map(read);
+            assert!(if leaves_alone {
+                read.any(|&vertex| vertex as usize == said)
+            } else {
+                said == 0
+            });
+        }
+        let moved = TriangleMesh::new(&mesh.positions, &mesh.indices).unwrap();
+        tree.refit(&moved).unwrap();
+        assert!(tree.nodes().iter().map(said).eq(before));
+    }
+
+    #[test]
+    fn nodes_say_where_vertices_are() {
+        check::<CompactNode4>();
+        check::<CompactNode8>();
     }
 }

@@ -15,6 +15,8 @@ use core::fmt;
 
 /// Caches are likely to hold what is over no more primitives than this.
 const LARGE: usize = 1 << 18;
+/// And they are not likely to hold even what the rays of a picture meet of what is over more than this.
+const VAST: usize = 1 << 22;
 
 /// A wide bounding volume hierarchy: nodes `N`, leaves `L`, memory of `S`.
 ///
@@ -35,6 +37,7 @@ pub struct Bvh<N: WideNode, L: Leaves, S: Storage> {
     /// All bits, or none, if it is no more than caches are likely to hold: a mask on what is looked at only then, which is one
     /// branch less than a condition.
     large: u32,
+    looks_ahead: bool,
 }
 
 /// Triangles under 8-wide nodes, borrowed. Queries: [`traverse`](crate::traverse).
@@ -122,9 +125,10 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         bounds: Aabb,
         root: Child,
     ) -> Self {
-        let is_large = L::len::<S>(&leaves, &primitives) > LARGE;
+        let len = L::len::<S>(&leaves, &primitives);
         Self {
-            large: u32::from(is_large).wrapping_neg(),
+            large: u32::from(len > LARGE).wrapping_neg(),
+            looks_ahead: len > VAST,
             numbers: L::numbers::<S>(&leaves, &primitives),
             nodes,
             leaves,
@@ -145,6 +149,12 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     /// How the leaves are kept.
     pub(super) fn leaf_store(&self) -> &L::Store<S> {
         &self.leaves
+    }
+
+    /// Whether it is more than the caches are likely to hold.
+    #[inline(always)]
+    pub(crate) fn is_large(&self) -> bool {
+        self.large != 0
     }
 
     /// How many primitives all leaves have together: one that is in several is counted as often.
@@ -180,6 +190,12 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         if let Some(place) = node.first_leaf(self.large) {
             token.prefetch_bytes(self.leaf_address(place), L::AHEAD);
         }
+    }
+
+    /// Has the vertices fetched that a node's leaves read, if it says where those are.
+    #[inline(always)]
+    pub(crate) fn prefetch_vertices<T: Simd>(&self, token: T, node: &N) {
+        L::fetch_vertices::<T, S>(token, &self.leaves, node.first_vertex());
     }
 
     /// The node that a link leads to.
@@ -237,16 +253,18 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
         self.backend = backend;
     }
 
-    /// Whether queries take it that caches do not hold the hierarchy, as they do if it is over more than 2^18 primitives.
+    /// Whether queries of one ray look ahead, as they do in a hierarchy over more than 2^22 primitives: while what is next is on
+    /// its way from memory they walk what was left behind last.
     #[inline(always)]
-    pub fn is_large(&self) -> bool {
-        self.large != 0
+    pub fn looks_ahead(&self) -> bool {
+        self.looks_ahead
     }
 
-    /// Has queries take it that caches do not hold the hierarchy, or that they do: worth a try where a program uses the caches
-    /// for much else. The answers are the same.
-    pub fn set_large(&mut self, is_large: bool) {
-        self.large = u32::from(is_large).wrapping_neg();
+    /// Has queries of one ray [look ahead](Self::looks_ahead), or not. They gain up to a sixth where caches do not hold what they
+    /// read, and lose up to a tenth where they do: worth a try if a program uses the caches for much else, or asks seldom. The
+    /// answers are the same.
+    pub fn set_looks_ahead(&mut self, looks_ahead: bool) {
+        self.looks_ahead = looks_ahead;
     }
 
     /// Notes that the builder left out this many primitives.
@@ -284,6 +302,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
             backend: self.backend,
             dropped: self.dropped,
             large: self.large,
+            looks_ahead: self.looks_ahead,
         }
     }
 

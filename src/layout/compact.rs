@@ -21,7 +21,8 @@ use core::{fmt::Debug, mem::offset_of};
 use glam::Vec3;
 
 /// `W` children, first those that are nodes, side by side in memory, then those that are leaves, whose primitives are
-/// side by side in the hierarchy's list.
+/// side by side in the hierarchy's list. If all are leaves, where nodes would be is of no use, and says about where the vertices
+/// are that leaves read, if [`Bvh::reorder`](super::Bvh::reorder) has put them in order: to be fetched, not relied on.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct CompactNode<const W: usize, H> {
@@ -53,6 +54,9 @@ pub trait Head: Pod + Debug {
     /// The place of the first primitive.
     #[doc(hidden)]
     fn first_leaf(&self) -> usize;
+    /// The place of the first child that is a node.
+    #[doc(hidden)]
+    fn first_node(&self) -> usize;
     /// How many children there are; of a node that is none, less than 16.
     #[doc(hidden)]
     fn children(&self, more: u8) -> usize;
@@ -107,6 +111,11 @@ impl Head for Head8 {
     #[inline(always)]
     fn first_leaf(&self) -> usize {
         self.units as usize
+    }
+
+    #[inline(always)]
+    fn first_node(&self) -> usize {
+        self.nodes as usize
     }
 
     #[inline(always)]
@@ -179,6 +188,11 @@ impl Head for Head4 {
     #[inline(always)]
     fn first_leaf(&self) -> usize {
         (self.units & Self::PLACE) as usize
+    }
+
+    #[inline(always)]
+    fn first_node(&self) -> usize {
+        (self.nodes & Self::PLACE) as usize
     }
 
     #[inline(always)]
@@ -264,6 +278,27 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
             .head
             .after(if first { 0 } else { nodes }, if last { leaves } else { 0 });
         Self { head, ..*self }
+    }
+
+    /// Where no child is a node, nothing else reads where the first one would be.
+    #[inline(always)]
+    fn first_vertex(&self) -> usize {
+        match self.head.link::<Self>(self.frame.more, 0).is_leaf() {
+            true => self.head.first_node(),
+            false => 0,
+        }
+    }
+
+    fn with_first_vertex(self, vertex: u32) -> Self {
+        let is_told = self.lanes() > 0 && self.head.link::<Self>(self.frame.more, 0).is_leaf();
+        let before = self.head.first_node() as u32;
+        let moved = if is_told {
+            vertex.wrapping_sub(before)
+        } else {
+            0
+        };
+        let head = self.head.after(moved, 0);
+        Self { head, ..self }
     }
 
     #[inline(always)]

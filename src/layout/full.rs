@@ -83,6 +83,15 @@ impl<const W: usize, A> Node<W, A> {
     }
 
     #[inline(always)]
+    fn first_vertex(&self) -> usize {
+        0
+    }
+
+    fn with_first_vertex(self, _: u32) -> Self {
+        self
+    }
+
+    #[inline(always)]
     fn first_leaf(&self, mask: u32) -> Option<usize> {
         // Most nodes that lead to leaves lead to nothing else.
         let link = Link::from_bits(self.links[0].to_bits() & mask);

@@ -93,6 +93,10 @@ pub trait Leaves: Sized + sealed::Sealed {
     #[doc(hidden)]
     #[inline(always)]
     unsafe fn fetch_next<T: Simd, S: Storage>(_: T, _: &Self::Store<S>, _: &[u32], _place: usize) {}
+    /// Has fetched the vertices, from one on, that leaves read whose triangles are in their order.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn fetch_vertices<T: Simd, S: Storage>(_: T, _: &Self::Store<S>, _first: usize) {}
     /// How many primitives a leaf has.
     #[doc(hidden)]
     fn primitives(leaf: Self::Ref<'_>) -> usize;

@@ -44,9 +44,9 @@ pub use leaves::{Leaves, TriangleLeaves, Triangles};
 pub use node::WideNode;
 pub(crate) use order::number_at;
 pub use order::{ByList, Counted, InOrder, Order};
-#[cfg(feature = "std")]
-pub(crate) use run::of_place;
 pub use run::{MeshLeaf, MeshTooSmall, OrderedLeaf, OrderedMeshLeaf, RunLeaf, Runs};
+#[cfg(feature = "std")]
+pub(crate) use run::{VERTICES, of_place};
 #[cfg(feature = "alloc")]
 pub use storage::Owned;
 pub use storage::{Borrowed, Storage};

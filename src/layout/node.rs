@@ -55,6 +55,15 @@ pub trait WideNode: Pod + Send + Sync + sealed::Sealed {
     #[doc(hidden)]
     fn first_leaf(&self, mask: u32) -> Option<usize>;
 
+    /// About where the vertices begin that its leaves read of a mesh, if it was told
+    /// ([`with_first_vertex`](Self::with_first_vertex)); else 0.
+    #[doc(hidden)]
+    fn first_vertex(&self) -> usize;
+
+    /// The same node, told about where the vertices begin that its leaves read, if it has room for that.
+    #[doc(hidden)]
+    fn with_first_vertex(self, vertex: u32) -> Self;
+
     /// How many lanes may have a child.
     #[doc(hidden)]
     fn lanes(&self) -> usize;
@@ -148,7 +157,8 @@ pub(super) mod sealed {
 /// - say where its links begin: `LINKS`;
 /// - give a child's box: `aabb`;
 /// - give the planes that are met first and last, a lane's or all: `lane_planes`, `planes`;
-/// - say where its leaves begin, if that is quickly found: `first_leaf`;
+/// - say where its leaves begin, if that is quickly found, and keep where their vertices do, if it can: `first_leaf`,
+///   `first_vertex`, `with_first_vertex`;
 /// - say how many lanes may have a child, and unset the others of a comparison's outcome or its bits: `lanes`, `present`,
 ///   `present_bits`;
 /// - say where a lane, or every one, leads: `link`, `link_lanes`, and the first by the second: `link_among`.
@@ -185,6 +195,15 @@ macro_rules! impl_wide_node {
             #[inline(always)]
             fn first_leaf(&self, mask: u32) -> Option<usize> {
                 self.first_leaf(mask)
+            }
+
+            #[inline(always)]
+            fn first_vertex(&self) -> usize {
+                self.first_vertex()
+            }
+
+            fn with_first_vertex(self, vertex: u32) -> Self {
+                self.with_first_vertex(vertex)
             }
 
             #[inline(always)]

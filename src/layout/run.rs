@@ -14,6 +14,10 @@ use core::{error::Error, fmt, marker::PhantomData, mem::MaybeUninit, ops::Range,
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 
+/// How many vertices are fetched at once for the leaves of a node, and in how many bytes of cache lines they lie at most.
+pub(crate) const VERTICES: usize = 16;
+const VERTEX_LINES: usize = 4 * 64;
+
 /// The run at a place.
 #[inline(always)]
 pub(crate) const fn of_place(place: usize) -> Range<usize> {
@@ -58,6 +62,8 @@ pub trait Numbered {
     /// # Safety
     /// There is such a one.
     unsafe fn fetch_parts<T: Simd>(&self, token: T, number: usize);
+    /// Has fetched [as many](VERTICES) parts that several are made of, from one on, which need not be there.
+    fn fetch_from<T: Simd>(&self, token: T, part: usize);
 }
 
 impl Numbered for () {
@@ -72,6 +78,9 @@ impl Numbered for () {
 
     #[inline(always)]
     unsafe fn fetch_parts<T: Simd>(&self, _: T, _: usize) {}
+
+    #[inline(always)]
+    fn fetch_from<T: Simd>(&self, _: T, _: usize) {}
 }
 
 impl Numbered for TriangleMesh<'_> {
@@ -93,6 +102,12 @@ impl Numbered for TriangleMesh<'_> {
             let positions = self.positions().as_ptr();
             token.prefetch_line(positions.wrapping_add(vertex as usize).cast());
         }
+    }
+
+    #[inline(always)]
+    fn fetch_from<T: Simd>(&self, token: T, vertex: usize) {
+        let first = self.positions().as_ptr().wrapping_add(vertex);
+        token.prefetch_bytes(first.cast(), VERTEX_LINES);
     }
 }
 
@@ -200,6 +215,13 @@ impl<M: Part + Numbered, O: Order> Leaves for Runs<M, O> {
                     O::of(over).fetch_parts(token, place);
                 }
             }
+        }
+    }
+
+    #[inline(always)]
+    fn fetch_vertices<T: Simd, S: Storage>(token: T, over: &O::Over<M>, first: usize) {
+        if !O::LISTED {
+            O::of(over).fetch_from(token, first);
         }
     }
 

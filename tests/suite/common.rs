@@ -150,11 +150,11 @@ fn add_backends<N: WideNode + Sync, L: TriangleLeaves, S: Storage>(
     Bvh<N, L, S>: Clone + Sync + 'static,
 {
     for backend in Backend::available() {
-        for (is_large, size) in [(false, ""), (true, ", as if large")] {
+        for (looks_ahead, how) in [(false, ""), (true, ", looking ahead")] {
             let mut bvh = bvh.clone();
             bvh.set_backend(backend);
-            bvh.set_large(is_large);
-            let name = format!("{kind}, {}-wide, {}{size}", N::WIDTH, backend.name());
+            bvh.set_looks_ahead(looks_ahead);
+            let name = format!("{kind}, {}-wide, {}{how}", N::WIDTH, backend.name());
             add(queries, name, bvh);
         }
     }

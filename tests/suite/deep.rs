@@ -79,8 +79,8 @@ fn check<N: WideNode>() {
     let through = Ray::new([0.02, 0.02, -1.0], [0.0, 0.0, 1.0]);
     for backend in Backend::available() {
         bvh.set_backend(backend);
-        for is_large in [false, true] {
-            bvh.set_large(is_large);
+        for looks_ahead in [false, true] {
+            bvh.set_looks_ahead(looks_ahead);
             let (hit, counts) = bvh.closest_hit_counted(&past);
             assert_eq!((hit, counts.nodes), (None, nodes));
             assert_eq!((bvh.closest_hit(&past), bvh.any_hit(&past)), (None, false));

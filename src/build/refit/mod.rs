@@ -35,7 +35,8 @@ fn update_nodes<N: WideNode, L: Leaves>(
     let moved = |node: &N, node_boxes: &[Aabb]| {
         let children = (0..N::WIDTH).map(|lane| node.child(lane));
         let children = children.take_while(|&child| child != Child::EMPTY);
-        N::from_children(children.map(|child| (of(child.kind(), node_boxes), child)))
+        let children = children.map(|child| (of(child.kind(), node_boxes), child));
+        N::from_children(children).with_first_vertex(node.first_vertex() as u32)
     };
     for (index, node) in nodes.iter_mut().enumerate().rev() {
         let children = (0..N::WIDTH).map(|lane| of(node.child(lane).kind(), &node_boxes));

@@ -68,8 +68,8 @@ trait Ask {
     ) {
         for backend in Backend::available() {
             bvh.set_backend(backend);
-            for is_large in [false, true] {
-                bvh.set_large(is_large);
+            for looks_ahead in [false, true] {
+                bvh.set_looks_ahead(looks_ahead);
                 self.ask(&bvh, vectors);
             }
         }

@@ -49,7 +49,7 @@ fn leaves<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened 
     let mut bvh = Bvh::<N, TriangleLeaf, Borrowed>::from_bytes(bytes)?;
     bvh.set_backend(backend);
     // What looks ahead relies on the most.
-    bvh.set_large(true);
+    bvh.set_looks_ahead(true);
     Ok(Box::new(bvh))
 }
 
@@ -60,6 +60,6 @@ fn runs<N: WideNode, O: Order + 'static>(
     let mut bvh = Bvh::<N, Runs<TriangleMesh, O>, Borrowed>::from_bytes(bytes)?;
     bvh.set_backend(backend);
     // What looks ahead relies on the most.
-    bvh.set_large(true);
+    bvh.set_looks_ahead(true);
     Ok(Box::new(bvh))
 }

@@ -172,8 +172,8 @@ fn check_width<N: WideNode>(
             continue;
         }
         let first = known.is_empty();
-        // All but the first as if caches did not hold them.
-        bvh.set_large(!first);
+        // Of all but the first as of what caches do not hold.
+        bvh.set_looks_ahead(!first);
         for (place, backend) in backends(first, rays).enumerate() {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
@@ -231,7 +231,7 @@ fn check_compact<N: WideNode>(
         }
         let first = known.is_empty();
         let mut bvh = tree.over(mesh).map_err(|error| no_build(&name, error))?;
-        bvh.set_large(!first);
+        bvh.set_looks_ahead(!first);
         for backend in backends(first, rays) {
             bvh.set_backend(backend);
             let name = || format!("{name}, {}", backend.name());
@@ -301,7 +301,7 @@ fn check_ordered<N: WideNode>(
     let mesh = TriangleMesh::new(&new.positions, &new.indices);
     let mesh = mesh.map_err(|error| no_build(&name, error))?;
     let mut bvh = tree.over(&mesh).map_err(|error| no_build(&name, error))?;
-    bvh.set_large(true);
+    bvh.set_looks_ahead(true);
     flushed_if(flush, || {
         let closest = |ray| reference::closest_hit(&mesh, ray);
         let expected: Vec<_> = rays.iter().map(closest).collect();
