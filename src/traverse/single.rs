@@ -55,7 +55,7 @@ impl Entry {
 /// The children left behind: those below a length were written, the next one last. Nothing is cleared, and the length is
 /// apart, to stay in a register.
 ///
-/// With more `ROOM` than [`STACK`] a walk looks ahead: see [`walk_boxes`].
+/// With `ROOM` for more than [`STACK`] a walk looks ahead: see [`walk_boxes`].
 pub(super) type Stack<const ROOM: usize> = [MaybeUninit<Entry>; ROOM];
 
 /// An empty [`Stack`].
@@ -63,12 +63,12 @@ pub(super) const fn stack<const ROOM: usize>() -> Stack<ROOM> {
     [MaybeUninit::uninit(); ROOM]
 }
 
-/// A walk does not look ahead where more children than this are left behind.
+/// While more children than this are left behind a walk does not look ahead.
 const AHEAD: usize = 64;
 /// The most children of a node.
 const WIDEST: usize = 8;
-/// Room for what a walk leaves behind that looks ahead: what was there when it last did, and what a walk leaves behind that does
-/// not.
+/// Room for what a walk leaves behind that looks ahead: what was there once it last did, and what it leaves behind since, no more
+/// than one that does not.
 const ROOM_AHEAD: usize = AHEAD + WIDEST + STACK;
 
 /// Takes `visitor` to every leaf whose box the ray passes within its range, which ends at `t_max` and shrinks on the way.
@@ -121,7 +121,7 @@ pub(super) fn walk_boxes<
     let margin = boxes.margin();
     let mut t_max = reach_of(t_max, margin);
     // Where any order will do, what is guessed is mostly right, and what caches hold is there in time.
-    let fetches = V::NEAREST_FIRST || bvh.is_large();
+    let fetches = V::NEAREST_FIRST || looks_ahead || bvh.is_large();
     let mut len = 0;
     let mut current = Link::new::<N>(bvh.root());
     // What is next, while another node is walked in its place; a leaf until it is tested. Else empty.
@@ -197,8 +197,8 @@ pub(super) fn walk_boxes<
                 if fetches {
                     bvh.prefetch(token, farther.link());
                 }
-                // SAFETY: the layout's check saw that a walk never leaves `STACK` children behind. If it looks ahead, they
-                // lie on those that were there when it last did, `AHEAD + WIDEST` at most.
+                // SAFETY: the layout's check saw that a walk never leaves `STACK` children behind. One that looks ahead leaves
+                // them on top of what was there when it last did: less than `AHEAD`, and a node's children.
                 unsafe { stack.get_unchecked_mut(len).write(farther) };
                 len += 1;
             }
@@ -209,7 +209,7 @@ pub(super) fn walk_boxes<
             current = nearest.link();
             if is_ahead {
                 bvh.prefetch(token, current);
-                // SAFETY: as above: `pop_node` took the node from `AHEAD` at most.
+                // SAFETY: `pop_node` left less than `AHEAD`, and on top are no more than a node's children.
                 unsafe { stack.get_unchecked_mut(len).write(nearest) };
                 len += 1;
                 current = resume(&mut waiting);
@@ -259,7 +259,7 @@ fn pop<L: Leaves, V: Visitor<L>, const ROOM: usize>(
     None
 }
 
-/// The last child left behind, if that is a node, near enough, and not one of more than [`AHEAD`].
+/// The last child left behind, if that is a node and near enough, and if no more than [`AHEAD`] are.
 #[inline(always)]
 fn pop_node<L: Leaves, V: Visitor<L>, const ROOM: usize>(
     stack: &Stack<ROOM>,
@@ -279,7 +279,7 @@ fn pop_node<L: Leaves, V: Visitor<L>, const ROOM: usize>(
     Some(entry.link())
 }
 
-/// What waits. Of a leaf it is kept in mind that it has waited.
+/// What waits. A leaf is kept in mind, not to wait again.
 #[inline(always)]
 fn resume(waiting: &mut Link) -> Link {
     let link = *waiting;
