@@ -14,9 +14,10 @@ use core::{error::Error, fmt, marker::PhantomData, mem::MaybeUninit, ops::Range,
 /// The bits of a place that say where a run begins.
 const FIRST: u32 = (1 << RUN_FIRST_BITS) - 1;
 
-/// How many vertices are fetched at once for the leaves of a node, and in how many bytes of cache lines they lie at most.
+/// How many vertices are fetched at once for the leaves of a node.
 pub(crate) const VERTICES: usize = 16;
-const VERTEX_LINES: usize = 4 * 64;
+/// The bytes of their cache lines, wherever in one they begin.
+const VERTEX_LINES: usize = size_of::<[[f32; 3]; VERTICES]>() + 64;
 
 /// The run at a place.
 #[inline(always)]

@@ -3,7 +3,7 @@
 
 use super::{
     boxes::OneByOne,
-    single::{Visitor, stack, walk_boxes},
+    single::{Room, Visitor, walk_boxes},
     triangles::Found,
 };
 use crate::{
@@ -37,8 +37,8 @@ pub(super) fn find<N: WideNode, L: TriangleLeaves, S: Storage>(
         found: None,
         any,
     };
-    let (t_max, mut stack) = (prepared.ray.t_max, stack::<STACK>());
-    walk_boxes(Portable, bvh, &mut boxes, t_max, &mut finder, &mut stack);
+    let (t_max, room) = (prepared.ray.t_max, Room::<STACK>);
+    walk_boxes(Portable, bvh, &mut boxes, t_max, &mut finder, room);
     let found = finder.found?;
     Some(found.hit(prepared.unscaled(found.t, ray), bvh.primitives()))
 }

@@ -33,7 +33,7 @@ pub(crate) trait Visitor<L: Leaves> {
 /// of the child, so that entries compare as their `t` do. Where boxes are tested one by one it may be negative: those come
 /// first, though not in order among themselves, which costs time and nothing else.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Entry(i64);
+struct Entry(i64);
 
 impl Entry {
     #[inline(always)]
@@ -52,16 +52,11 @@ impl Entry {
     }
 }
 
-/// The children left behind: those below a length were written, the next one last. Nothing is cleared, and the length is
-/// apart, to stay in a register.
-///
-/// With `ROOM` for more than [`STACK`] a walk looks ahead: see [`walk_boxes`].
-pub(super) type Stack<const ROOM: usize> = [MaybeUninit<Entry>; ROOM];
+/// The children left behind: those below a length were written, the next one last.
+type Stack<const ROOM: usize> = [MaybeUninit<Entry>; ROOM];
 
-/// An empty [`Stack`].
-pub(super) const fn stack<const ROOM: usize>() -> Stack<ROOM> {
-    [MaybeUninit::uninit(); ROOM]
-}
+/// How many children a walk has room for to leave behind. With more than [`STACK`] it looks ahead: see [`walk_boxes`].
+pub(super) struct Room<const CHILDREN: usize>;
 
 /// While more children than this are left behind a walk does not look ahead.
 const AHEAD: usize = 64;
@@ -85,11 +80,11 @@ pub(crate) fn walk<T: Simd, N: WideNode, L: Leaves, S: Storage, V: Visitor<L>>(
     }
     let mut boxes = AtOnce::new(token, ray);
     if T::FETCHES && bvh.looks_ahead() {
-        let mut stack = stack::<ROOM_AHEAD>();
-        walk_boxes(token, bvh, &mut boxes, t_max, visitor, &mut stack);
+        let room = Room::<ROOM_AHEAD>;
+        walk_boxes(token, bvh, &mut boxes, t_max, visitor, room);
     } else {
-        let mut stack = stack::<STACK>();
-        walk_boxes(token, bvh, &mut boxes, t_max, visitor, &mut stack);
+        let room = Room::<STACK>;
+        walk_boxes(token, bvh, &mut boxes, t_max, visitor, room);
     }
 }
 
@@ -114,7 +109,7 @@ pub(super) fn walk_boxes<
     boxes: &mut B,
     t_max: f32,
     visitor: &mut V,
-    stack: &mut Stack<ROOM>,
+    _: Room<ROOM>,
 ) {
     const { assert!(N::WIDTH <= WIDEST) };
     let looks_ahead = const { ROOM >= ROOM_AHEAD };
@@ -122,6 +117,8 @@ pub(super) fn walk_boxes<
     let mut t_max = reach_of(t_max, margin);
     // Where any order will do, what is guessed is mostly right, and what caches hold is there in time.
     let fetches = V::NEAREST_FIRST || looks_ahead || bvh.is_large();
+    // Apart, so that the length stays in a register and nothing is cleared.
+    let mut stack: Stack<ROOM> = [MaybeUninit::uninit(); ROOM];
     let mut len = 0;
     let mut current = Link::new::<N>(bvh.root());
     // What is next, while another node is walked in its place; a leaf until it is tested. Else empty.
@@ -145,7 +142,7 @@ pub(super) fn walk_boxes<
                     current = resume(&mut waiting);
                     continue;
                 }
-                match pop::<L, V, ROOM>(stack, &mut len, t_max) {
+                match pop::<L, V, ROOM>(&stack, &mut len, t_max) {
                     Some(link) => current = link,
                     None => return,
                 }
@@ -165,7 +162,7 @@ pub(super) fn walk_boxes<
                 // A leaf is looked after below. With several children the last one left behind has not been fetched, either.
                 if looks_ahead
                     && !current.is_leaf()
-                    && let Some(ahead) = pop_node::<L, V, ROOM>(stack, &mut len, t_max)
+                    && let Some(ahead) = pop_node::<L, V, ROOM>(&stack, &mut len, t_max)
                 {
                     bvh.prefetch(token, current);
                     waiting = mem::replace(&mut current, ahead);
@@ -218,7 +215,7 @@ pub(super) fn walk_boxes<
 
         if looks_ahead {
             if waiting == Link::EMPTY
-                && let Some(ahead) = pop_node::<L, V, ROOM>(stack, &mut len, t_max)
+                && let Some(ahead) = pop_node::<L, V, ROOM>(&stack, &mut len, t_max)
             {
                 // SAFETY: the layout's check saw that all leaves led to are there.
                 unsafe { bvh.fetch_next(token, current.leaf()) };
@@ -234,7 +231,7 @@ pub(super) fn walk_boxes<
             ControlFlow::Continue(t) => t_max = reach_of(t, margin),
         }
         boxes.renew();
-        match pop::<L, V, ROOM>(stack, &mut len, t_max) {
+        match pop::<L, V, ROOM>(&stack, &mut len, t_max) {
             Some(link) => current = link,
             None => return,
         }
