@@ -51,15 +51,13 @@ pub(crate) fn ask<N: WideNode>(
                 any,
             });
         };
+        bvh.set_looks_ahead(true);
+        add("one by one, looking ahead", singles(&bvh, rays));
+        add("counted, looking ahead", counted(&bvh, rays));
         bvh.set_looks_ahead(false);
         add("one by one", singles(&bvh, rays));
         add("counted", counted(&bvh, rays));
         add("a batch", batch(&bvh, rays));
-        bvh.set_looks_ahead(true);
-        add("one by one, looking ahead", singles(&bvh, rays));
-        add("counted, looking ahead", counted(&bvh, rays));
-        add("a batch, looking ahead", batch(&bvh, rays));
-        bvh.set_looks_ahead(false);
         add("one lane", waves::<N, _, 1>(&bvh, rays));
         add("13 lanes", waves::<N, _, 13>(&bvh, rays));
         add("64 lanes", waves::<N, _, 64>(&bvh, rays));

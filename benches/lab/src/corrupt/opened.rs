@@ -46,20 +46,25 @@ pub fn opener(header: &Header) -> Option<Open> {
 }
 
 fn leaves<N: WideNode>(bytes: &[u8], backend: Backend) -> Result<Box<dyn Opened + '_>, BytesError> {
-    let mut bvh = Bvh::<N, TriangleLeaf, Borrowed>::from_bytes(bytes)?;
-    bvh.set_backend(backend);
-    // What looks ahead relies on the most.
-    bvh.set_looks_ahead(true);
-    Ok(Box::new(bvh))
+    Ok(set(Bvh::<N, TriangleLeaf, _>::from_bytes(bytes)?, backend))
 }
 
 fn runs<N: WideNode, O: Order + 'static>(
     bytes: &[u8],
     backend: Backend,
 ) -> Result<Box<dyn Opened + '_>, BytesError> {
-    let mut bvh = Bvh::<N, Runs<TriangleMesh, O>, Borrowed>::from_bytes(bytes)?;
+    Ok(set(
+        Bvh::<N, Runs<TriangleMesh, O>, _>::from_bytes(bytes)?,
+        backend,
+    ))
+}
+
+/// To be asked with a backend, and looking ahead, which relies on the most.
+fn set<'a, N: WideNode, L: TriangleLeaves + 'a>(
+    mut bvh: Bvh<N, L, Borrowed<'a>>,
+    backend: Backend,
+) -> Box<dyn Opened + 'a> {
     bvh.set_backend(backend);
-    // What looks ahead relies on the most.
     bvh.set_looks_ahead(true);
-    Ok(Box::new(bvh))
+    Box::new(bvh)
 }

@@ -172,7 +172,7 @@ fn check_width<N: WideNode>(
             continue;
         }
         let first = known.is_empty();
-        // Of all but the first as of what caches do not hold.
+        // Both ways are asked: the first as it is, all others looking ahead.
         bvh.set_looks_ahead(!first);
         for (place, backend) in backends(first, rays).enumerate() {
             bvh.set_backend(backend);
