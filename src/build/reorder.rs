@@ -3,7 +3,7 @@
 use super::{ReorderError, pages};
 use crate::{
     geometry::TriangleMesh,
-    layout::{Bvh, ChildKind, OrderedLeaf, Owned, RunLeaf, VERTICES, WideNode, of_place},
+    layout::{Bvh, OrderedLeaf, Owned, RunLeaf, VERTICES, WideNode, of_child},
 };
 use std::{vec, vec::Vec};
 
@@ -76,10 +76,8 @@ impl<N: WideNode> Bvh<N, RunLeaf, Owned> {
         let mut used = Vec::new();
         let told = self.nodes().iter().map(|node| {
             used.clear();
-            for lane in 0..N::WIDTH {
-                if let ChildKind::Leaf(place) = node.child(lane).kind() {
-                    used.extend(reordered.indices[of_place(place)].as_flattened());
-                }
+            for run in (0..N::WIDTH).filter_map(|lane| of_child(node.child(lane))) {
+                used.extend(reordered.indices[run].as_flattened());
             }
             node.with_first_vertex(first_of_most(&mut used))
         });
@@ -136,7 +134,7 @@ mod tests {
     use super::*;
     use crate::{
         build::Builder,
-        layout::{CompactNode4, CompactNode8},
+        layout::{ChildKind, CompactNode4, CompactNode8},
     };
     use fastrand::Rng;
 
@@ -165,15 +163,12 @@ mod tests {
         let said = |node: &N| node.first_vertex();
         let before: Vec<_> = tree.nodes().iter().map(said).collect();
         for (node, &said) in tree.nodes().iter().zip(&before) {
-            let children = (0..N::WIDTH).map(|lane| node.child(lane).kind());
-            let read = |child| match child {
-                ChildKind::Leaf(place) => mesh.indices[of_place(place)].as_flattened(),
-                _ => &[],
-            };
+            let children = (0..N::WIDTH).map(|lane| node.child(lane));
             let leaves_alone = !children
                 .clone()
-                .any(|child| matches!(child, ChildKind::Node(_)));
-            let mut read = children.flat_map(read);
+                .any(|child| matches!(child.kind(), ChildKind::Node(_)));
+            let runs = children.filter_map(of_child);
+            let mut read = runs.flat_map(|run| mesh.indices[run].as_flattened());
             assert!(if leaves_alone {
                 read.any(|&vertex| vertex as usize == said)
             } else {

@@ -261,7 +261,7 @@ impl<N: WideNode, L: Leaves, S: Storage> Bvh<N, L, S> {
     }
 
     /// Has queries of one ray [look ahead](Self::looks_ahead), or not. They gain up to a sixth where caches do not hold what they
-    /// read, and lose up to a tenth where they do: worth a try if a program uses the caches for much else, or asks seldom. The
+    /// read, and lose up to a seventh where they do: worth a try if a program uses the caches for much else, or asks seldom. The
     /// answers are the same.
     pub fn set_looks_ahead(&mut self, looks_ahead: bool) {
         self.looks_ahead = looks_ahead;

@@ -280,23 +280,25 @@ impl<const W: usize, H: Head> CompactNode<W, H> {
         Self { head, ..*self }
     }
 
-    /// Where no child is a node, nothing else reads where the first one would be.
+    /// Whether no child is a node: then nothing else reads where the first one would be. Without children it is either.
+    #[inline(always)]
+    fn has_leaves_alone(&self) -> bool {
+        self.head.link::<Self>(self.frame.more, 0).is_leaf()
+    }
+
     #[inline(always)]
     fn first_vertex(&self) -> usize {
-        match self.head.link::<Self>(self.frame.more, 0).is_leaf() {
+        match self.has_leaves_alone() {
             true => self.head.first_node(),
             false => 0,
         }
     }
 
     fn with_first_vertex(self, vertex: u32) -> Self {
-        let is_told = self.lanes() > 0 && self.head.link::<Self>(self.frame.more, 0).is_leaf();
-        let before = self.head.first_node() as u32;
-        let moved = if is_told {
-            vertex.wrapping_sub(before)
-        } else {
-            0
-        };
+        if !self.has_leaves_alone() {
+            return self;
+        }
+        let moved = vertex.wrapping_sub(self.head.first_node() as u32);
         let head = self.head.after(moved, 0);
         Self { head, ..self }
     }

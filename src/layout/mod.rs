@@ -46,7 +46,7 @@ pub(crate) use order::number_at;
 pub use order::{ByList, Counted, InOrder, Order};
 pub use run::{MeshLeaf, MeshTooSmall, OrderedLeaf, OrderedMeshLeaf, RunLeaf, Runs};
 #[cfg(feature = "std")]
-pub(crate) use run::{VERTICES, of_place};
+pub(crate) use run::{VERTICES, of_child, of_place};
 #[cfg(feature = "alloc")]
 pub use storage::Owned;
 pub use storage::{Borrowed, Storage};

@@ -4,6 +4,8 @@ use super::{
     Borrowed, Bvh, ByList, Gather, InOrder, LayoutError, Leaves, Listed, Order, Storage,
     TriangleLeaf, Triangles, WideNode, gather::Gathering, leaves::in_lanes, order::Part,
 };
+#[cfg(feature = "std")]
+use super::{Child, ChildKind};
 use crate::{
     geometry::TriangleMesh,
     primitive::triangle::{Exact, Look, RayShear, Sheared},
@@ -24,6 +26,15 @@ const VERTEX_LINES: usize = size_of::<[[f32; 3]; VERTICES]>() + 64;
 pub(crate) const fn of_place(place: usize) -> Range<usize> {
     let first = place & FIRST as usize;
     first..first + (place >> RUN_FIRST_BITS & (MAX_RUN - 1)) + 1
+}
+
+/// The run that a child is, if it is a leaf.
+#[cfg(feature = "std")]
+pub(crate) fn of_child(child: Child) -> Option<Range<usize>> {
+    match child.kind() {
+        ChildKind::Leaf(place) => Some(of_place(place)),
+        _ => None,
+    }
 }
 
 /// Leaves of up to 4 primitives, which are read from an `M`, and known by a list of numbers or by their order.

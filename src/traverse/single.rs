@@ -136,9 +136,10 @@ pub(super) fn walk_boxes<
                     bvh.prefetch_vertices(token, node);
                 }
             }
+            let is_ahead = looks_ahead && waiting != Link::EMPTY;
             let (mask, near) = boxes.test(node, t_max);
             if mask == 0 {
-                if looks_ahead && waiting != Link::EMPTY {
+                if is_ahead {
                     current = resume(&mut waiting);
                     continue;
                 }
@@ -157,7 +158,6 @@ pub(super) fn walk_boxes<
             };
             // SAFETY: `mask` has bits for the node's lanes alone.
             current = unsafe { node.link(first) };
-            let is_ahead = looks_ahead && waiting != Link::EMPTY;
             if others == 0 && !is_ahead {
                 // A leaf is looked after below. With several children the last one left behind has not been fetched, either.
                 if looks_ahead

@@ -65,7 +65,8 @@ fn bvh<N: WideNode>(tree: &Tree, aabb: Aabb) -> (Bvh<N, RunLeaf, Owned>, u32) {
 
 fn check<N: WideNode>() {
     let width = N::WIDTH;
-    // While it follows the chain a walk that looks ahead has time for the combs beside it, before it needs its stack for the one below.
+    // While it follows the chain a walk that looks ahead has time for the combs beside it, before it needs its stack for
+    // the one below.
     let levels = (STACK - 1) / (width - 1) - 1;
     let beside = (1..width).map(|_| comb(width, levels));
     let first = chain(300, comb(width, levels));

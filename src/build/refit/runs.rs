@@ -7,7 +7,7 @@ use crate::{
         input::{Boxes, Input, TrianglesInRuns},
     },
     geometry::{Aabb, TriangleMesh},
-    layout::{Bvh, Child, ChildKind, Order, Owned, Runs, WideNode, number_at, of_place},
+    layout::{Bvh, Order, Owned, Runs, WideNode, number_at, of_child, of_place},
 };
 use core::ops::Range;
 use std::{vec, vec::Vec};
@@ -84,10 +84,6 @@ impl<N: WideNode, O: Order> Bvh<N, Runs<(), O>, Owned> {
     fn runs(&self) -> Vec<Range<usize>> {
         let nodes = self.nodes().iter();
         let below = nodes.flat_map(|node| (0..N::WIDTH).map(|lane| node.child(lane)));
-        let run = |child: Child| match child.kind() {
-            ChildKind::Leaf(place) => Some(of_place(place)),
-            _ => None,
-        };
-        below.chain([self.root()]).filter_map(run).collect()
+        below.chain([self.root()]).filter_map(of_child).collect()
     }
 }
