@@ -138,6 +138,9 @@ pub(super) fn walk_boxes<
             }
             let is_ahead = looks_ahead && waiting != Link::EMPTY;
             let (mask, near) = boxes.test(node, t_max);
+            // Written before it is known whether several children are met, which is often guessed wrong: they are to be
+            // read at once then.
+            let near = B::nears(near);
             if mask == 0 {
                 if is_ahead {
                     current = resume(&mut waiting);
@@ -169,7 +172,6 @@ pub(super) fn walk_boxes<
                 }
                 continue;
             }
-            let near = B::nears(near);
             // SAFETY: `mask` has a bit for the lane, and bits for the node's lanes alone.
             let entry = |lane: usize| unsafe {
                 let near = if V::NEAREST_FIRST {
