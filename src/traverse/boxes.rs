@@ -11,9 +11,7 @@ use glam::Vec3;
 
 /// A ray in terms of nodes `N`.
 pub(super) trait Boxes<N: WideNode> {
-    /// From which `t` on the ray is in the boxes, as it comes.
-    type Near: Copy;
-    /// The same, to be taken from.
+    /// From which `t` on the ray is in the boxes, to be taken from.
     type Nears;
 
     /// To be called after a leaf, which needs the registers: what nodes need is loaded again.
@@ -22,8 +20,7 @@ pub(super) trait Boxes<N: WideNode> {
     /// By how much the greatest `t` is to be raised.
     fn margin(&self) -> f32;
     /// Which children the ray may meet up to `t_max`, a bit each, and from which `t` on.
-    fn test(&self, node: &N, t_max: f32) -> (u32, Self::Near);
-    fn nears(near: Self::Near) -> Self::Nears;
+    fn test(&self, node: &N, t_max: f32) -> (u32, Self::Nears);
     /// From which `t` on the ray is in a child's box.
     ///
     /// # Safety
@@ -54,7 +51,6 @@ impl<'a, T: Simd, N: WideNode> AtOnce<'a, T, N> {
 }
 
 impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<'_, T, N> {
-    type Near = N::Lanes<T>;
     type Nears = <N::Lanes<T> as Lanes>::Array;
 
     #[inline(always)]
@@ -67,15 +63,13 @@ impl<T: Simd, N: WideNode> Boxes<N> for AtOnce<'_, T, N> {
         N::margin(&self.slabs)
     }
 
+    /// Numbers are written before it is known whether several children are met, which is often guessed wrong: they are to be
+    /// read at once then.
     #[inline(always)]
-    fn test(&self, node: &N, t_max: f32) -> (u32, N::Lanes<T>) {
+    fn test(&self, node: &N, t_max: f32) -> (u32, Self::Nears) {
         let t_max = N::Lanes::<T>::splat(self.token, t_max);
-        node.test(self.token, &self.slabs, t_max)
-    }
-
-    #[inline(always)]
-    fn nears(near: N::Lanes<T>) -> Self::Nears {
-        near.to_array()
+        let (mask, near) = node.test(self.token, &self.slabs, t_max);
+        (mask, near.to_array())
     }
 
     #[inline(always)]
@@ -106,8 +100,7 @@ impl OneByOne {
 
 impl<N: WideNode> Boxes<N> for OneByOne {
     // Nothing is cleared, which would be a call.
-    type Near = [MaybeUninit<f32>; Self::MOST];
-    type Nears = Self::Near;
+    type Nears = [MaybeUninit<f32>; Self::MOST];
 
     #[inline(always)]
     fn margin(&self) -> f32 {
@@ -115,7 +108,7 @@ impl<N: WideNode> Boxes<N> for OneByOne {
     }
 
     #[inline(always)]
-    fn test(&self, node: &N, t_max: f32) -> (u32, Self::Near) {
+    fn test(&self, node: &N, t_max: f32) -> (u32, Self::Nears) {
         const { assert!(N::WIDTH <= Self::MOST) };
         let (mut mask, mut nears) = (0, [MaybeUninit::uninit(); Self::MOST]);
         for lane in 0..node.lanes() {
@@ -126,11 +119,6 @@ impl<N: WideNode> Boxes<N> for OneByOne {
             nears[lane % Self::MOST] = MaybeUninit::new(near.0);
         }
         (mask, nears)
-    }
-
-    #[inline(always)]
-    fn nears(near: Self::Near) -> Self::Nears {
-        near
     }
 
     #[inline(always)]

@@ -137,10 +137,7 @@ pub(super) fn walk_boxes<
                 }
             }
             let is_ahead = looks_ahead && waiting != Link::EMPTY;
-            let (mask, near) = boxes.test(node, t_max);
-            // Written before it is known whether several children are met, which is often guessed wrong: they are to be
-            // read at once then.
-            let near = B::nears(near);
+            let (mask, nears) = boxes.test(node, t_max);
             if mask == 0 {
                 if is_ahead {
                     current = resume(&mut waiting);
@@ -175,7 +172,7 @@ pub(super) fn walk_boxes<
             // SAFETY: `mask` has a bit for the lane, and bits for the node's lanes alone.
             let entry = |lane: usize| unsafe {
                 let near = if V::NEAREST_FIRST {
-                    B::near(&near, lane)
+                    B::near(&nears, lane)
                 } else {
                     0.0
                 };
